@@ -56,10 +56,10 @@ fn refine_claim(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var n = 0u; n < count; n++) {
         let k = start + select(count - 1u - n, n, is_before) * step;
         let own = unpack_color(colors[k]);
-        if distance(own, near) * PREFERENCE >= distance(own, far) {
+        if distance(own, near) * COLOR_PREFERENCE >= distance(own, far) {
             break;
         }
         claims[k] = near_m;
-        near += FOLLOW * (own - near);
+        near += COLOR_UPDATE_RATE * (own - near);
     }
 }

@@ -18,8 +18,8 @@ override MAX_BITS: u32;
 override MAP_SURFACE: f32;              // samples within this fraction are one surface
 override HOLE_SURFACE: f32;             // sides of a hole within this ratio are one surface
 override SAMPLE_PX: u32;                // pixels in the mean colour of a side of a hole
-override PREFERENCE: f32;               // weight of the distance to the near side's colour
-override FOLLOW: f32;                   // rate at which the near side's colour is updated
+override COLOR_PREFERENCE: f32;         // weight of the distance to the near side's colour
+override COLOR_UPDATE_RATE: f32;        // rate at which the near side's colour is updated
 override LAG_PX: u32;                   // spacing of the samples of a second difference
 override NOISE_GRID: u32;               // maximum number of samples along rows, and along columns
 override SMOOTH_FRACTION: f32;          // fraction of the differences on smooth surfaces

@@ -39,8 +39,8 @@ fn stereo_census(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = y * WIDTH + x;
     census[camera * WIDTH * HEIGHT + pixel] = code;
     if camera == 0u {
-        let left = penalty_of(difference(center, luma_at(max(x, 1u) - 1u, y, 0u)));
-        let above = penalty_of(difference(center, luma_at(x, max(y, 1u) - 1u, 0u)));
+        let left = penalty_of(abs_diff(center, luma_at(max(x, 1u) - 1u, y, 0u)));
+        let above = penalty_of(abs_diff(center, luma_at(x, max(y, 1u) - 1u, 0u)));
         penalties[pixel] = left | (above << 8u);
     }
 }

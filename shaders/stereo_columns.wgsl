@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<storage, read> costs: array<u32>;
 @group(0) @binding(1) var<storage, read> penalties: array<u32>;
 @group(0) @binding(2) var<storage, read> sums: array<u32>;          // half of the values of the paths along rows
-@group(0) @binding(3) var<storage, read_write> totals: array<u32>;  // of all paths, at `total_at`
+@group(0) @binding(3) var<storage, read_write> totals: array<u32>;  // of all paths, at `total_index`
 
 fn pixel_at(column: u32, step: u32) -> u32 {
     return min(step, HEIGHT - 1u) * WIDTH + column;
@@ -21,7 +21,7 @@ fn sum_at(cell: u32) -> u32 {
 
 fn store_sum(column: u32, step: u32, word: u32, sum: u32) {
     if step < HEIGHT {
-        totals[total_at(column, step, word)] = sum;
+        totals[total_index(column, step, word)] = sum;
     }
 }
 

@@ -1,10 +1,10 @@
-// Pass stereo_gaps: removes small islands, and fills the gaps of each row with the farther one of the disparities left
+// Pass stereo_gaps: removes speckles, and fills the gaps of each row with the farther one of the disparities left
 // and right of them. Pixels left of the first known one stay unknown.
 // twin: src/depth/stereo/gaps.rs
 
 @group(0) @binding(0) var<storage, read> labels: array<u32>;
 @group(0) @binding(1) var<storage, read> sizes: array<u32>;
-@group(0) @binding(2) var<storage, read_write> map: array<u32>;     // without islands afterwards, for the next pair
+@group(0) @binding(2) var<storage, read_write> map: array<u32>;     // without speckles afterwards, for the next pair
 @group(0) @binding(3) var<storage, read_write> filled: array<u32>;
 
 // The first and the last known disparity of each invocation's columns.
@@ -19,7 +19,7 @@ fn stereo_gaps(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invoc
     for (var at = columns.x; at < columns.y; at++) {
         var disparity = map[at];
         // The label of a pixel is the first one of its run, whose label is the root.
-        if sizes[labels[labels[at]]] <= ISLAND {
+        if sizes[labels[labels[at]]] <= MAX_SPECKLE {
             disparity = UNKNOWN;
             map[at] = UNKNOWN;
         }

@@ -1,9 +1,9 @@
-// Pass stereo_join: joins islands from row to row.
+// Pass stereo_join: joins components from row to row.
 // twin: src/depth/stereo/cpu/speckle.rs
 
-// Joins the islands of two runs: the label of one root becomes the other root. If another invocation changed that label
-// first, its value is joined, too. The larger of both roots decreases in every iteration.
-fn join(one: u32, other: u32) {
+// Joins the components of two runs: the label of one root becomes the other root. If another invocation changed that
+// label first, its value is joined, too. The larger of both roots decreases in every iteration.
+fn join_components(one: u32, other: u32) {
     var a = root_of(one);
     var b = root_of(other);
     while a != b {
@@ -34,6 +34,6 @@ fn stereo_join(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
         && is_connected(map[pixel - 1u], map[pixel]) && is_connected(map[above - 1u], map[above]) {
         return;
     }
-    // The label of a run's first pixel may be another run of the island, which does as well.
-    join(atomicLoad(&labels[pixel]), atomicLoad(&labels[above]));
+    // The label of a run's first pixel may be another run of the component, which does as well.
+    join_components(atomicLoad(&labels[pixel]), atomicLoad(&labels[above]));
 }

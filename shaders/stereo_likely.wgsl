@@ -10,7 +10,7 @@
 fn change_at(x: u32, y: u32) -> u32 {
     let at = y * WIDTH + x;
     let shift = 8u * (at % 4u);
-    return difference((luma[at / 4u] >> shift) & 255u, (last[at / 4u] >> shift) & 255u);
+    return abs_diff((luma[at / 4u] >> shift) & 255u, (last[at / 4u] >> shift) & 255u);
 }
 
 // Returns the sum over 3x3 pixels; beyond the border the outermost ones repeat.
@@ -32,6 +32,6 @@ fn stereo_likely(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workg
         return;
     }
     let disparity = map[pixel];
-    let holds = disparity != UNKNOWN && change_around(pixel % WIDTH, pixel / WIDTH) <= NOISE;
+    let holds = disparity != UNKNOWN && change_around(pixel % WIDTH, pixel / WIDTH) <= MAX_NOISE;
     likely[pixel] = select(0u, (disparity + ONE / 2u) / ONE + 1u, holds);
 }

@@ -12,26 +12,26 @@ var<workgroup> states: array<array<u32, MAX_WORDS + 2u>, 2>;
 var<workgroup> least: array<atomic<u32>, 3>;
 
 // Inputs of the next four pixels of a path, prefetched while the previous four are processed.
-struct Ahead {
+struct Prefetched {
     costs: vec4<u32>,
     sums: vec4<u32>,
     penalties: vec4<u32>,
 }
 
-fn fetch(line: u32, step: u32, word: u32) -> Ahead {
+fn prefetch(line: u32, step: u32, word: u32) -> Prefetched {
     let a = pixel_at(line, step);
     let b = pixel_at(line, step + 1u);
     let c = pixel_at(line, step + 2u);
     let d = pixel_at(line, step + 3u);
     let cells = vec4(a, b, c, d) * WORDS + word;
-    return Ahead(
+    return Prefetched(
         vec4(costs[cells.x], costs[cells.y], costs[cells.z], costs[cells.w]),
         vec4(sum_at(cells.x), sum_at(cells.y), sum_at(cells.z), sum_at(cells.w)),
         vec4(penalty_at(a), penalty_at(b), penalty_at(c), penalty_at(d)),
     );
 }
 
-fn prepare(word: u32) {
+fn init_path(word: u32) {
     if word == 0u {
         for (var side = 0u; side < 2u; side++) {
             states[side][0] = PADDING;
@@ -47,7 +47,7 @@ fn prepare(word: u32) {
 fn advance(step: u32, word: u32, values: vec4<u32>, cost: vec4<u32>, penalty: u32) -> vec4<u32> {
     let side = step % 2u;
     states[side][word + 1u] = pack4xU8(values);
-    atomicMin(&least[step % 3u], least_of(values));
+    atomicMin(&least[step % 3u], min_of(values));
     if word == 0u {
         atomicStore(&least[(step + 1u) % 3u], PADDING);
     }
@@ -70,13 +70,13 @@ fn advance_and_store(
 }
 
 fn trace_path(line: u32, length: u32, word: u32) {
-    prepare(word);
+    init_path(word);
     // From zeros, the first step yields the costs.
     var values = vec4(0u);
-    var ahead = fetch(line, 0u, word);
+    var ahead = prefetch(line, 0u, word);
     for (var step = 0u; step < length; step += 4u) {
         let now = ahead;
-        ahead = fetch(line, step + 4u, word);
+        ahead = prefetch(line, step + 4u, word);
         values = advance_and_store(line, step, word, values, now.costs.x, now.sums.x, now.penalties.x);
         values = advance_and_store(line, step + 1u, word, values, now.costs.y, now.sums.y, now.penalties.y);
         values = advance_and_store(line, step + 2u, word, values, now.costs.z, now.sums.z, now.penalties.z);

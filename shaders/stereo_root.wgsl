@@ -1,6 +1,6 @@
-// Included by the passes that follow runs of an island. The label of a run's first pixel is the first pixel of a run of
-// the same island, further up or left or its own; that of the other pixels is the run's first one. Labels only ever
-// decrease, and a label read meanwhile stays within the island: so no invocation waits, and every loop ends.
+// Included by the passes that follow runs of a component. The label of a run's first pixel is the first pixel of a run
+// of the same component, further up or left or its own; that of the other pixels is the run's first one. Labels only
+// ever decrease, and a label read meanwhile stays within the component: so no invocation waits, and every loop ends.
 
 @group(0) @binding(0) var<storage, read> map: array<u32>;
 @group(0) @binding(1) var<storage, read_write> labels: array<atomic<u32>>;

@@ -7,16 +7,16 @@
 
 fn pixel_at(row: u32, step: u32) -> u32 {
     let x = min(step, WIDTH - 1u);
-    return row * WIDTH + select(x, WIDTH - 1u - x, BACK == 1u);
+    return row * WIDTH + select(x, WIDTH - 1u - x, FROM_RIGHT == 1u);
 }
 
 // Returns P2 between a pixel and the previous one of the path. At the start of a path the value does not matter.
 fn penalty_at(pixel: u32) -> u32 {
-    return penalties[min(pixel + BACK, WIDTH * HEIGHT - 1u)] & 255u;
+    return penalties[min(pixel + FROM_RIGHT, WIDTH * HEIGHT - 1u)] & 255u;
 }
 
 fn sum_at(cell: u32) -> u32 {
-    if BACK == 1u {
+    if FROM_RIGHT == 1u {
         return sums[cell];
     }
     // The buffer still has the sums of the last pair.

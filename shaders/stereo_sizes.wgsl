@@ -1,5 +1,5 @@
-// Pass stereo_sizes: counts the pixels of each island at its root; counts beyond ISLAND may be too low. Afterwards the
-// label of a run's first pixel is its island's root.
+// Pass stereo_sizes: counts the pixels of each component at its root; counts beyond MAX_SPECKLE may be too low.
+// Afterwards the label of a run's first pixel is its component's root.
 // twin: src/depth/stereo/cpu/speckle.rs
 
 @group(0) @binding(2) var<storage, read_write> sizes: array<atomic<u32>>;
@@ -22,8 +22,8 @@ fn stereo_sizes(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
     }
     let root = root_of(first);
     atomicMin(&labels[first], root);
-    // Islands beyond the limit need no further counting.
-    if atomicLoad(&sizes[root]) <= ISLAND {
+    // Components beyond the limit need no further counting.
+    if atomicLoad(&sizes[root]) <= MAX_SPECKLE {
         atomicAdd(&sizes[root], pixel - first + 1u);
     }
 }

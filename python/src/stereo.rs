@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::DepthError;
-use bokehcam::depth::stereo::check::{Verdict, check};
+use bokehcam::depth::stereo::check::{Verdict, check_pair};
 use bokehcam::depth::stereo::{Effort, Matcher as Matching, Pair};
 use bokehcam::frame::DisparityMap;
 use numpy::{PyArray2, PyArrayMethods, ToPyArray};
@@ -49,8 +49,8 @@ impl Matcher {
         let (matching, found) = wait_for(py, move || {
             let mut disparity = DisparityMap::default();
             let pair = Pair { left: &left, color: color.as_ref(), right: &right };
-            let found = matching.disparity(pair, &mut disparity).and_then(|()| {
-                let verdict = if checks { Some(check(&left, &right, disparities)?.verdict()) } else { None };
+            let found = matching.compute_disparity(pair, &mut disparity).and_then(|()| {
+                let verdict = if checks { Some(check_pair(&left, &right, disparities)?.verdict()) } else { None };
                 Ok((disparity, verdict))
             });
             (matching, found.map_err(DepthError::from))
@@ -58,10 +58,10 @@ impl Matcher {
         *self.matching.lock().map_err(errors::value)? = Some(matching);
         let (disparity, verdict) = found.map_err(errors::value)?;
         let warning = match verdict {
-            Some(verdict @ Verdict::RowsOff { .. }) => {
+            Some(verdict @ Verdict::Misaligned { .. }) => {
                 Some(format!("{verdict}, and the disparity is wrong; rectify it"))
             }
-            Some(verdict @ (Verdict::Swapped | Verdict::Same)) => Some(verdict.to_string()),
+            Some(verdict @ (Verdict::Swapped | Verdict::Identical)) => Some(verdict.to_string()),
             _ => None,
         };
         let shape = [disparity.height as usize, disparity.width as usize];

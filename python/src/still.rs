@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::still::check_depth_size;
@@ -65,7 +65,7 @@ impl Still {
             return Ok(());
         };
         let arrays = Image::from_arrays(image, out)?;
-        if matches!(arrays, Image::Linear(..)) && self.look.background != Behind::Blur {
+        if matches!(arrays, Image::Linear(..)) && self.look.background != Background::Blur {
             return Err(errors::value("behind: a virtual background needs 8-bit sRGB: give a uint8 image"));
         }
         let mut color = match &arrays {

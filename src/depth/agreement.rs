@@ -5,7 +5,7 @@
 //! and from the near side to the far one. If the depth fits, this profile peaks in the middle; if it belongs to another
 //! picture, there is no peak.
 
-use super::fill::Filler;
+use super::fill::HoleFiller;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// Radius in pixels of the profile around a discontinuity, in a picture downsampled to at most [`MAX_COLUMNS`].
@@ -36,9 +36,9 @@ pub enum EdgeAlignment {
     /// There are too few discontinuities for a conclusion.
     Unknown,
     /// They coincide.
-    Meets,
+    Aligned,
     /// The picture's edges lie beside the depth edges.
-    Beside {
+    Shifted {
         /// Mean distance from the depth edges, in pixels of the picture, rounded, not 0: positive outwards, seen from
         /// the nearer surface; negative if near objects are too wide in depth.
         distance_px: i32,
@@ -53,7 +53,7 @@ pub enum EdgeAlignment {
 }
 
 /// A picture and its depth, downsampled.
-struct Reduced {
+struct DownsampledPair {
     width: usize,
     height: usize,
     luma: Vec<f32>,
@@ -68,29 +68,29 @@ impl EdgeAlignment {
         if map.metres.is_empty() || color.rgb.is_empty() {
             return Self::Unknown;
         }
-        let lines = Reduced::new(map, color);
+        let lines = DownsampledPair::new(map, color);
         let mut near = lines.inverse.clone();
         let at = near.len() * 19 / 20;
         let min_step = MIN_STEP * *near.select_nth_unstable_by(at, f32::total_cmp).1;
         let (mut all, mut measured) = (EdgeProfile::default(), EdgeProfile::default());
         for y in (0..lines.height).step_by(2) {
-            lines.scan((y * lines.width, 1, lines.width), min_step, [&mut all, &mut measured]);
+            lines.scan_line((y * lines.width, 1, lines.width), min_step, [&mut all, &mut measured]);
         }
         for x in (0..lines.width).step_by(2) {
-            lines.scan((x, lines.width, lines.height), min_step, [&mut all, &mut measured]);
+            lines.scan_line((x, lines.width, lines.height), min_step, [&mut all, &mut measured]);
         }
         // Pixels of the picture per downsampled pixel.
         let scale = color.width as f32 / lines.width as f32;
-        match (all.peak(), measured.peak()) {
+        match (all.find_peak(), measured.find_peak()) {
             (Some((_, _, peak)), _) if peak < MAX_FLAT_PEAK => Self::Unrelated,
             (_, Some((at_px, middle, peak))) if peak >= MIN_PEAK && middle < MIDDLE_FRACTION * peak => {
-                Self::Beside { distance_px: ((at_px * scale).abs().ceil() * at_px.signum()) as i32 }
+                Self::Shifted { distance_px: ((at_px * scale).abs().ceil() * at_px.signum()) as i32 }
             }
             (_, Some(_)) => match measured.widths_px / measured.edges as f32 {
                 width_px if width_px >= SOFT_PX => Self::Soft { width_px: (width_px * scale).round() as u32 },
-                _ => Self::Meets,
+                _ => Self::Aligned,
             },
-            (Some(_), None) => Self::Meets,
+            (Some(_), None) => Self::Aligned,
             (None, None) => Self::Unknown,
         }
     }
@@ -110,7 +110,7 @@ impl EdgeProfile {
     /// Returns the position of the profile's peak in pixels from the discontinuity towards the far side, the value in
     /// the middle, and the peak; both values are means of three places, as edges are wide. `None` with too few
     /// discontinuities.
-    fn peak(&self) -> Option<(f32, f32, f32)> {
+    fn find_peak(&self) -> Option<(f32, f32, f32)> {
         let smooth = |at: usize| self.profile[at - 1..=at + 1].iter().sum::<f32>() / (3 * self.edges) as f32;
         let best = (1..2 * RADIUS).max_by(|&a, &b| smooth(a).total_cmp(&smooth(b)))?;
         let enough = self.edges >= MIN_EDGES;
@@ -118,7 +118,7 @@ impl EdgeProfile {
     }
 }
 
-impl Reduced {
+impl DownsampledPair {
     /// Downsamples luma by averaging and depth by picking samples, to the columns of the map or fewer.
     fn new(map: &DepthMap, color: &ColorImage) -> Self {
         let (from_width, from_height) = (color.width as usize, color.height as usize);
@@ -142,7 +142,7 @@ impl Reduced {
             }
         }
         let known = reduced.metres.iter().map(|&z_m| DepthMap::is_known(z_m)).collect();
-        Filler::new().fill(&mut reduced);
+        HoleFiller::new().fill(&mut reduced);
         let inverse = reduced.metres.iter().map(|&z_m| DepthMap::inverse_depth(z_m)).collect();
         Self { width, height, luma, inverse, known }
     }
@@ -150,7 +150,12 @@ impl Reduced {
     /// Adds the discontinuities of at least `min_step` of a line of `len` pixels, `step` apart: all to the first, and
     /// to the second those without holes. In a hole, which every sensor has beside near objects, the position of the
     /// edge is unknown.
-    fn scan(&self, (first, step, len): (usize, usize, usize), min_step: f32, [all, measured]: [&mut EdgeProfile; 2]) {
+    fn scan_line(
+        &self,
+        (first, step, len): (usize, usize, usize),
+        min_step: f32,
+        [all, measured]: [&mut EdgeProfile; 2],
+    ) {
         let inverse = |at: usize| self.inverse[first + at * step];
         let change = |at: usize| (inverse(at + 1) - inverse(at)).abs();
         let mut at = RADIUS;
@@ -182,10 +187,10 @@ impl Reduced {
                 changes.reverse();
             }
             let is_measured = (here - STEP_RADIUS..=here + STEP_RADIUS + 1).all(|at| self.known[first + at * step]);
-            for outlines in [Some(&mut *all), is_measured.then_some(&mut *measured)].into_iter().flatten() {
-                outlines.profile.iter_mut().zip(&changes).for_each(|(sum, change)| *sum += change / mean);
-                outlines.edges += 1;
-                outlines.widths_px += height / steepest;
+            for profiles in [Some(&mut *all), is_measured.then_some(&mut *measured)].into_iter().flatten() {
+                profiles.profile.iter_mut().zip(&changes).for_each(|(sum, change)| *sum += change / mean);
+                profiles.edges += 1;
+                profiles.widths_px += height / steepest;
             }
             at = here + STEP_RADIUS;
         }

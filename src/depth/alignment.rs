@@ -43,25 +43,25 @@ impl Default for Alignment {
 /// Estimates alignments; owns its buffers.
 #[derive(Debug, Default)]
 pub struct Aligner {
-    bins: Vec<u32>,
+    histogram: Vec<u32>,
     /// The plate, shifted.
     shifted: Vec<[f32; 3]>,
     shifted_by: Option<[f32; 2]>,
 }
 
 impl Aligner {
-    /// Returns the plate as shifted by the last call of [`Aligner::shift`].
-    pub fn shifted(&self) -> &[[f32; 3]] {
+    /// Returns the plate as shifted by the last call of [`Aligner::shift_plate`].
+    pub fn shifted_plate(&self) -> &[[f32; 3]] {
         &self.shifted
     }
 
     /// Invalidates the shifted plate, after a change of the plate.
-    pub fn forget(&mut self) {
+    pub fn invalidate(&mut self) {
         self.shifted_by = None;
     }
 
     /// Shifts the plate with bilinear interpolation.
-    pub fn shift(&mut self, plate: &[[f32; 3]], (width, height): (usize, usize), shift: [f32; 2]) {
+    pub fn shift_plate(&mut self, plate: &[[f32; 3]], (width, height): (usize, usize), shift: [f32; 2]) {
         if self.shifted_by == Some(shift) && self.shifted.len() == plate.len() {
             return;
         }
@@ -85,15 +85,21 @@ impl Aligner {
         }
     }
 
-    /// Moves `alignment` a step towards that of `now`, from the pixels that are not `foreign`.
-    pub fn step(&mut self, now: &[[f32; 3]], foreign: &[bool], size: (usize, usize), alignment: &mut Alignment) {
+    /// Moves `alignment` a step towards that of `now`, from the pixels that are not `is_foreground`.
+    pub fn update(
+        &mut self,
+        now: &[[f32; 3]],
+        is_foreground: &[bool],
+        size: (usize, usize),
+        alignment: &mut Alignment,
+    ) {
         for p in 0..3 {
-            if let Some(gain) = self.estimate_gain(now, foreign, p) {
-                let off = gain / alignment.gain[p] - 1.0;
-                alignment.gain[p] *= 1.0 + if off.abs() > MAX_EASED { off } else { RATE * off };
+            if let Some(gain) = self.estimate_gain(now, is_foreground, p) {
+                let correction = gain / alignment.gain[p] - 1.0;
+                alignment.gain[p] *= 1.0 + if correction.abs() > MAX_EASED { correction } else { RATE * correction };
             }
         }
-        let step = self.estimate_shift(now, foreign, size, alignment.gain);
+        let step = self.estimate_shift(now, is_foreground, size, alignment.gain);
         if let Some([across, down]) = step.filter(|[across, down]| across.hypot(*down) >= MIN_STEP) {
             alignment.shift[0] += across.clamp(-MAX_STEP, MAX_STEP);
             alignment.shift[1] += down.clamp(-MAX_STEP, MAX_STEP);
@@ -102,24 +108,24 @@ impl Aligner {
 
     /// Returns the median of now / plate in channel `p`, which a minority of foreground does not change; `None` if too
     /// little background is visible.
-    fn estimate_gain(&mut self, now: &[[f32; 3]], foreign: &[bool], p: usize) -> Option<f32> {
-        self.bins.clear();
-        self.bins.resize(BINS, 0);
+    fn estimate_gain(&mut self, now: &[[f32; 3]], is_foreground: &[bool], p: usize) -> Option<f32> {
+        self.histogram.clear();
+        self.histogram.resize(BINS, 0);
         let mut count = 0;
-        let all = now.iter().zip(&self.shifted).zip(foreign).step_by(SAMPLING_STEP);
-        for ((now, plate), _) in all.filter(|(_, foreign)| !**foreign) {
+        let all = now.iter().zip(&self.shifted).zip(is_foreground).step_by(SAMPLING_STEP);
+        for ((now, plate), _) in all.filter(|(_, is_foreground)| !**is_foreground) {
             if now[p].min(plate[p]) > MIN_VALUE && now[p].max(plate[p]) < MAX_VALUE {
                 let bin = (now[p] / plate[p]).log2() * PER_OCTAVE + BINS as f32 / 2.0;
-                self.bins[(bin as usize).min(BINS - 1)] += 1;
+                self.histogram[(bin as usize).min(BINS - 1)] += 1;
                 count += 1;
             }
         }
-        if count < foreign.len() / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
+        if count < is_foreground.len() / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
             return None;
         }
         let mut below = 0;
         let half = count as f32 / 2.0;
-        self.bins.iter().zip(0..).find_map(|(&inside, bin)| {
+        self.histogram.iter().zip(0..).find_map(|(&inside, bin)| {
             below += inside;
             let is_median = below as f32 >= half;
             let within = 1.0 - (below as f32 - half) / (inside.max(1)) as f32;
@@ -132,7 +138,7 @@ impl Aligner {
     fn estimate_shift(
         &self,
         now: &[[f32; 3]],
-        foreign: &[bool],
+        is_foreground: &[bool],
         (width, height): (usize, usize),
         gain: [f32; 3],
     ) -> Option<[f32; 2]> {
@@ -142,7 +148,7 @@ impl Aligner {
                 let at = y * width + x;
                 let value = |at: usize| gain[1] * self.shifted[at][1];
                 let rest = now[at][1] - value(at);
-                if foreign[at] || rest.abs() > MAX_DIFFERENCE {
+                if is_foreground[at] || rest.abs() > MAX_DIFFERENCE {
                     continue;
                 }
                 let across = 0.5 * (value(at + 1) - value(at - 1));
@@ -180,10 +186,10 @@ mod tests {
         let is_person = |k: usize| (20..50).contains(&(k % SIZE.0)) && k / SIZE.0 > 15;
         (0..now.len()).filter(|&k| is_person(k)).for_each(|k| now[k] = [200.0, 40.0, 90.0]);
         let (mut aligner, mut alignment) = (Aligner::default(), Alignment::default());
-        let foreign = vec![false; now.len()];
+        let is_foreground = vec![false; now.len()];
         for _ in 0..12 {
-            aligner.shift(&plate, SIZE, alignment.shift);
-            aligner.step(&now, &foreign, SIZE, &mut alignment);
+            aligner.shift_plate(&plate, SIZE, alignment.shift);
+            aligner.update(&now, &is_foreground, SIZE, &mut alignment);
         }
         let Alignment { gain, shift } = alignment;
         assert!((shift[0] - right).abs() < 0.08 && (shift[1] - down).abs() < 0.08, "{shift:?}");

@@ -15,13 +15,13 @@ use crate::optics::DepthCoc;
 /// Ratios of inverse depth to that of the far end of the range in focus: above the first, a surface is kept; below the
 /// second, it is replaced; in between, it is faded. A person leaning back stays above the first; a wall half as far
 /// again as the person is below the second.
-const BEHIND: [f32; 2] = [0.8, 0.667];
+const BACKGROUND_RAMP: [f32; 2] = [0.8, 0.667];
 /// Surfaces in front of the focal plane with a smaller CoC, in pixels, do not blur over the background.
 const SHARP_PX: f32 = 0.5;
 
 /// What to show behind the subject.
 #[derive(Clone, Debug, Default)]
-pub enum Behind {
+pub enum Background {
     /// The room, blurred.
     #[default]
     Blur,
@@ -40,7 +40,7 @@ pub struct BackgroundPicture {
     pub image: ColorImage,
 }
 
-impl PartialEq for Behind {
+impl PartialEq for Background {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Blur, Self::Blur) => true,
@@ -55,51 +55,51 @@ impl PartialEq for Behind {
 /// Replaces the background of frame after frame; owns the memory for it.
 #[derive(Debug)]
 pub struct VirtualBackground {
-    behind: Behind,
-    light: Box<[f32; 256]>,
-    /// Lookup table to sRGB: [`CODES`] entries, uniform in the square root of linear light.
-    codes: Box<[u8; CODES]>,
+    background: Background,
+    linear: Box<[f32; 256]>,
+    /// Lookup table to sRGB: [`TABLE_LEN`] entries, uniform in the square root of linear light.
+    srgb_table: Box<[u8; TABLE_LEN]>,
     /// The virtual background, scaled to the frame.
     scaled: ColorImage,
     scale: Scale,
     row: Vec<u16>,
-    mixed: Vec<Mixed>,
+    composited: Vec<CompositedPixel>,
 }
 
 /// The composited values of a mixed pixel.
 #[derive(Debug)]
-struct Mixed {
+struct CompositedPixel {
     at: usize,
     rgb: [u8; 3],
     metres: f32,
 }
 
 /// Entries of the table to sRGB: the darkest codes are four entries apart.
-const CODES: usize = 4096;
+const TABLE_LEN: usize = 4096;
 /// Pixels processed together: mostly all or none of them are replaced.
 const CHUNK: usize = 32;
 
 impl VirtualBackground {
-    /// Creates a virtual background; `None` for [`Behind::Blur`].
-    pub fn new(behind: &Behind) -> Option<Self> {
-        if *behind == Behind::Blur {
+    /// Creates a virtual background; `None` for [`Background::Blur`].
+    pub fn new(background: &Background) -> Option<Self> {
+        if *background == Background::Blur {
             return None;
         }
-        let light_of = |step: usize| (step as f32 / (CODES - 1) as f32).powi(2);
+        let linear_of = |step: usize| (step as f32 / (TABLE_LEN - 1) as f32).powi(2);
         Some(Self {
-            behind: behind.clone(),
-            light: srgb_to_linear_table(),
-            codes: Box::new(std::array::from_fn(|step| encode_srgb(light_of(step)))),
+            background: background.clone(),
+            linear: srgb_to_linear_table(),
+            srgb_table: Box::new(std::array::from_fn(|step| encode_srgb(linear_of(step)))),
             scaled: ColorImage::default(),
             scale: Scale::default(),
             row: Vec::new(),
-            mixed: Vec::new(),
+            composited: Vec::new(),
         })
     }
 
     /// Returns what replaces the room.
-    pub fn behind(&self) -> &Behind {
-        &self.behind
+    pub fn background(&self) -> &Background {
+        &self.background
     }
 
     /// Replaces the background of a picture. The map has no holes, has its matte and is as large as the picture; a map
@@ -108,41 +108,41 @@ impl VirtualBackground {
         if color.size() != map.size() {
             return;
         }
-        self.scale_to(color.size());
+        self.scale_to_frame(color.size());
         // Mixed pixels first: they need the original colours.
         let mut pixels = std::mem::take(&mut map.matte.pixels);
-        self.mixed.clear();
+        self.composited.clear();
         pixels.retain_mut(|pixel| self.composite_mixed(pixel, color, lens));
         map.matte.pixels = pixels;
         let parts =
             color.rgb.chunks_mut(3 * CHUNK).zip(self.scaled.rgb.chunks(3 * CHUNK)).zip(map.metres.chunks_mut(CHUNK));
-        for ((rgb, behind), metres) in parts {
+        for ((rgb, background), metres) in parts {
             let mut fractions = [0.0; CHUNK];
             for (fraction, metres) in fractions.iter_mut().zip(&*metres) {
                 *fraction = background_fraction(*metres, lens);
             }
             let fractions = &fractions[..metres.len()];
             if fractions.iter().all(|&fraction| fraction == 1.0) {
-                rgb.copy_from_slice(behind);
+                rgb.copy_from_slice(background);
                 metres.fill(lens.focus_m);
             } else if fractions.iter().any(|&fraction| fraction > 0.0) {
-                self.blend(rgb, behind, metres, (fractions, lens));
+                self.blend(rgb, background, metres, (fractions, lens));
             }
         }
-        for &Mixed { at, rgb, metres } in &self.mixed {
+        for &CompositedPixel { at, rgb, metres } in &self.composited {
             color.rgb[3 * at..3 * at + 3].copy_from_slice(&rgb);
             map.metres[at] = metres;
         }
     }
 
     /// Blends pixels with the virtual background by the weights `fractions`, 0 to 1.
-    fn blend(&self, rgb: &mut [u8], behind: &[u8], metres: &mut [f32], (fractions, lens): (&[f32], &DepthCoc)) {
-        let pixels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(behind.as_chunks::<3>().0);
-        for (((pixel, behind), metres), &fraction) in pixels.zip(metres).zip(fractions) {
+    fn blend(&self, rgb: &mut [u8], background: &[u8], metres: &mut [f32], (fractions, lens): (&[f32], &DepthCoc)) {
+        let pixels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(background.as_chunks::<3>().0);
+        for (((pixel, background), metres), &fraction) in pixels.zip(metres).zip(fractions) {
             *metres = pull_to_focus(*metres, fraction, lens);
-            for (code, &behind) in pixel.iter_mut().zip(behind) {
-                let [own, light] = [*code, behind].map(|code| self.light[usize::from(code)]);
-                *code = if fraction == 1.0 { behind } else { self.encode(own + fraction * (light - own)) };
+            for (code, &background) in pixel.iter_mut().zip(background) {
+                let [own, linear] = [*code, background].map(|code| self.linear[usize::from(code)]);
+                *code = if fraction == 1.0 { background } else { self.encode_linear(own + fraction * (linear - own)) };
             }
         }
     }
@@ -157,13 +157,15 @@ impl VirtualBackground {
         }
         let mut rgb = [0; 3];
         for (p, code) in rgb.iter_mut().enumerate() {
-            let (light, behind) =
-                (self.light[usize::from(color.rgb[3 * at + p])], self.light[usize::from(self.scaled.rgb[3 * at + p])]);
+            let (linear, background) = (
+                self.linear[usize::from(color.rgb[3 * at + p])],
+                self.linear[usize::from(self.scaled.rgb[3 * at + p])],
+            );
             let surfaces =
-                [light + (1.0 - pixel.alpha) * pixel.difference[p], light - pixel.alpha * pixel.difference[p]];
-            let [near, far] = [0, 1].map(|k| surfaces[k] + fractions[k] * (behind - surfaces[k]));
+                [linear + (1.0 - pixel.alpha) * pixel.difference[p], linear - pixel.alpha * pixel.difference[p]];
+            let [near, far] = [0, 1].map(|k| surfaces[k] + fractions[k] * (background - surfaces[k]));
             pixel.difference[p] = near - far;
-            *code = self.encode(far + pixel.alpha * (near - far));
+            *code = self.encode_linear(far + pixel.alpha * (near - far));
         }
         pixel.behind = 1.0;
         let surfaces = [(pixel.near_m, fractions[0]), (pixel.far_m, fractions[1])];
@@ -173,35 +175,35 @@ impl VirtualBackground {
         let seen_m = if pixel.alpha > 0.5 { near_m } else { far_m };
         // A pixel with nothing in front of the background is fully composited now, and moves to the focal plane.
         let metres = if is_in_front { seen_m } else { lens.focus_m };
-        self.mixed.push(Mixed { at, rgb, metres });
+        self.composited.push(CompositedPixel { at, rgb, metres });
         is_in_front
     }
 
     /// Scales the virtual background to the frame size.
-    fn scale_to(&mut self, (width, height): (u32, u32)) {
+    fn scale_to_frame(&mut self, (width, height): (u32, u32)) {
         if self.scaled.size() == (width, height) {
             return;
         }
         self.scaled.resize(width, height);
-        match &self.behind {
-            Behind::Blur => {}
-            Behind::Color(rgb) => self.scaled.rgb.as_chunks_mut::<3>().0.fill(*rgb),
-            Behind::Picture(picture) => {
+        match &self.background {
+            Background::Blur => {}
+            Background::Color(rgb) => self.scaled.rgb.as_chunks_mut::<3>().0.fill(*rgb),
+            Background::Picture(picture) => {
                 scale_to_cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row));
             }
         }
     }
 
-    fn encode(&self, light: f32) -> u8 {
-        let light = light.clamp(0.0, 1.0);
-        self.codes[(light.sqrt() * (CODES - 1) as f32 + 0.5) as usize]
+    fn encode_linear(&self, linear: f32) -> u8 {
+        let linear = linear.clamp(0.0, 1.0);
+        self.srgb_table[(linear.sqrt() * (TABLE_LEN - 1) as f32 + 0.5) as usize]
     }
 }
 
 /// Returns how far a distance counts as background: 0 in focus, 1 behind, with a linear ramp in inverse depth.
 #[inline(always)]
 fn background_fraction(metres: f32, lens: &DepthCoc) -> f32 {
-    let [none, all] = BEHIND;
+    let [none, all] = BACKGROUND_RAMP;
     let nearness = lens.far_m() * DepthMap::inverse_depth(metres);
     let fraction = (none - nearness) / (none - all);
     let fraction = if fraction > 0.0 { fraction } else { 0.0 };
@@ -236,7 +238,7 @@ mod tests {
     use super::*;
 
     const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
-    const GREEN: Behind = Behind::Color([0, 177, 64]);
+    const GREEN: Background = Background::Color([0, 177, 64]);
 
     /// Returns six grey pixels (code 100) in a row at these distances.
     fn row(metres: [f32; 6]) -> (ColorImage, DepthMap) {
@@ -244,15 +246,15 @@ mod tests {
         (color, DepthMap { width: 6, height: 1, metres: metres.to_vec(), ..DepthMap::default() })
     }
 
-    fn lay(behind: &Behind, color: &mut ColorImage, map: &mut DepthMap) {
-        VirtualBackground::new(behind).unwrap().replace_background(color, map, &LENS);
+    fn replace(background: &Background, color: &mut ColorImage, map: &mut DepthMap) {
+        VirtualBackground::new(background).unwrap().replace_background(color, map, &LENS);
     }
 
     #[test]
     fn only_what_is_well_behind_the_focal_plane_is_replaced_and_is_in_focus_then() {
-        assert!(VirtualBackground::new(&Behind::Blur).is_none());
+        assert!(VirtualBackground::new(&Background::Blur).is_none());
         let (mut color, mut map) = row([0.4, 1.0, 1.2, 2.0, 50.0, 0.0]);
-        lay(&GREEN, &mut color, &mut map);
+        replace(&GREEN, &mut color, &mut map);
         let pixels = color.rgb.as_chunks::<3>().0;
         assert_eq!(pixels[..3], [[100; 3]; 3]);
         assert_eq!(pixels[3..], [[0, 177, 64]; 3], "and what nobody measured");
@@ -263,7 +265,7 @@ mod tests {
     fn a_slope_fades_without_a_step() {
         let metres = std::array::from_fn(|k| 1.25 + 0.05 * k as f32);
         let (mut color, mut map) = row(metres);
-        lay(&Behind::Color([255, 0, 100]), &mut color, &mut map);
+        replace(&Background::Color([255, 0, 100]), &mut color, &mut map);
         let red: Vec<u8> = color.rgb.iter().step_by(3).copied().collect();
         assert!(red[0] == 100 && red[5] > 230 && red.is_sorted(), "{red:?}");
         assert!(color.rgb.iter().skip(2).step_by(3).all(|&blue| blue.abs_diff(100) <= 1), "equal light stays");
@@ -273,34 +275,34 @@ mod tests {
     #[test]
     fn a_mixed_pixel_keeps_its_share_of_the_subject() {
         let (mut color, mut map) = row([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]);
-        let light = srgb_to_linear_table();
+        let linear = srgb_to_linear_table();
         // Subject of code 100 before a wall of code 200: the pixel between them is 60 % subject.
-        let (near, far) = (light[100], light[200]);
+        let (near, far) = (linear[100], linear[200]);
         let own = encode_srgb(0.6 * near + 0.4 * far);
         color.rgb[6..9].fill(own);
         let pixel =
             |near_m, far_m| MixedPixel { at: 2, near_m, far_m, alpha: 0.6, behind: 0.4, difference: [near - far; 3] };
         let before = (color.clone(), map.clone());
         map.matte.pixels = vec![pixel(1.0, 3.0)];
-        lay(&GREEN, &mut color, &mut map);
+        replace(&GREEN, &mut color, &mut map);
         assert!(map.matte.pixels.is_empty() && map.metres[2] == 1.0, "both are in focus now");
         for (p, code) in [0, 177, 64].into_iter().enumerate() {
-            let due = encode_srgb(0.6 * near + 0.4 * light[code]);
+            let due = encode_srgb(0.6 * near + 0.4 * linear[code]);
             assert!(color.rgb[6 + p].abs_diff(due) <= 1, "{} not {due}", color.rgb[6 + p]);
         }
         // The near surface is in front of the focal plane here: it still blurs over the background.
         (color, map) = before.clone();
         map.matte.pixels = vec![pixel(0.5, 3.0)];
-        lay(&GREEN, &mut color, &mut map);
+        replace(&GREEN, &mut color, &mut map);
         let [left] = map.matte.pixels[..] else { panic!("it shows two surfaces") };
         assert_eq!((left.near_m, left.far_m, left.alpha, left.behind), (0.5, 1.0, 0.6, 1.0));
         for (p, code) in [0, 177, 64].into_iter().enumerate() {
-            assert!((left.difference[p] - (near - light[code])).abs() < 0.02);
+            assert!((left.difference[p] - (near - linear[code])).abs() < 0.02);
         }
         // Neither surface is behind: nothing changes.
         (color, map) = before;
         map.matte.pixels = vec![pixel(0.5, 1.0)];
-        lay(&GREEN, &mut color, &mut map);
+        replace(&GREEN, &mut color, &mut map);
         assert_eq!(map.matte.pixels, [pixel(0.5, 1.0)]);
         assert_eq!(color.rgb[6..9], [own; 3]);
     }
@@ -314,7 +316,7 @@ mod tests {
         }
         let mut color = ColorImage::new(20, 20);
         let mut map = DepthMap { metres: vec![9.0; 400], ..DepthMap::new(20, 20) };
-        lay(&Behind::Picture(Arc::new(BackgroundPicture { file: None, image: wide })), &mut color, &mut map);
+        replace(&Background::Picture(Arc::new(BackgroundPicture { file: None, image: wide })), &mut color, &mut map);
         let at = |x: usize, y: usize| color.rgb.as_chunks::<3>().0[20 * y + x];
         // Columns 20 to 60 of the picture are left, two to a pixel.
         for x in [2, 7, 12, 17] {

@@ -9,11 +9,11 @@
 use crate::frame::{ColorImage, DepthMap, compute_luma};
 
 /// Standard deviation of the Gaussian for the re-blur, and of the one that denoises gradients, in pixels of a picture
-/// of [`WIDTH`] columns.
+/// of [`TARGET_WIDTH`] columns.
 const REBLUR_PX: f32 = 1.0;
 const DENOISE_PX: f32 = 0.8;
 /// Approximate number of columns in which pictures are analysed: at this size, blurred edges span few pixels.
-const WIDTH: usize = 1024;
+const TARGET_WIDTH: usize = 1024;
 /// Minimum gradient of an edge, in codes per pixel.
 const MIN_GRADIENT: f32 = 4.0;
 /// Maximum blur of an edge, as a standard deviation: beyond it, an edge cannot be told from a gradient of light.
@@ -35,90 +35,94 @@ const MIN_RANGE_PX: f32 = 1.2;
 /// Estimates the relative depth of a photograph, at its size: the sharpest parts are the subject, at
 /// [`DepthMap::SUBJECT_M`], the most blurred ones practically infinitely far. Returns `None` if there are hardly any
 /// edges, or all are equally sharp.
-pub fn depth(color: &ColorImage) -> Option<DepthMap> {
-    let by = (color.width as usize / WIDTH).max(1);
-    let small = downscale(color, by);
+pub fn estimate_depth(color: &ColorImage) -> Option<DepthMap> {
+    let factor = (color.width as usize / TARGET_WIDTH).max(1);
+    let small = downscale(color, factor);
     let size = (small.width as usize, small.height as usize);
-    let edges = edge_blur(&small);
-    let squares = median_blurs(&edges, size);
+    let edges = estimate_edge_blur(&small);
+    let squares = compute_median_blurs(&edges, size);
     let at = |quantile: f32| squares.get((squares.len().saturating_sub(1) as f32 * quantile) as usize).copied();
     let (sharp_px, soft_px) = (at(SHARP_QUANTILE)?, at(SOFT_QUANTILE)?);
     if soft_px < sharp_px + MIN_RANGE_PX {
         return None;
     }
-    let soft = propagate(color, &edges, (size, by));
+    let blur_px = propagate_blur(color, &edges, (size, factor));
     let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
-    for (metres, soft) in map.metres.iter_mut().zip(soft) {
-        let nearness = 1.0 - ((soft - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
+    for (metres, blur_px) in map.metres.iter_mut().zip(blur_px) {
+        let nearness = 1.0 - ((blur_px - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
         *metres = DepthMap::relative_to_metres(nearness);
     }
     Some(map)
 }
 
-/// Downscales by the mean of squares of `by` x `by` pixels; a rest at the right and the bottom is cropped.
-fn downscale(color: &ColorImage, by: usize) -> ColorImage {
-    let (width, height) = ((color.width as usize / by).max(1), (color.height as usize / by).max(1));
+/// Downscales by the mean of squares of `factor` x `factor` pixels; a rest at the right and the bottom is cropped.
+fn downscale(color: &ColorImage, factor: usize) -> ColorImage {
+    let (width, height) = ((color.width as usize / factor).max(1), (color.height as usize / factor).max(1));
     let mut small = ColorImage::new(width as u32, height as u32);
     for (at, code) in small.rgb.iter_mut().enumerate() {
         let (x, y, p) = (at / 3 % width, at / 3 / width, at % 3);
-        let sum: usize = (0..by * by)
-            .map(|k| usize::from(color.rgb[3 * ((y * by + k / by) * color.width as usize + x * by + k % by) + p]))
+        let sum: usize = (0..factor * factor)
+            .map(|k| {
+                usize::from(
+                    color.rgb[3 * ((y * factor + k / factor) * color.width as usize + x * factor + k % factor) + p],
+                )
+            })
             .sum();
-        *code = (sum / (by * by)) as u8;
+        *code = (sum / (factor * factor)) as u8;
     }
     small
 }
 
 /// Estimates the blur of each edge pixel, as a standard deviation in pixels; NaN elsewhere.
-fn edge_blur(color: &ColorImage) -> Vec<f32> {
+fn estimate_edge_blur(color: &ColorImage) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut codes = vec![0; width * height];
     compute_luma(&color.rgb, &mut codes);
     let luma: Vec<f32> = codes.iter().map(|&code| f32::from(code)).collect();
-    let own = gaussian(&luma, (width, height), DENOISE_PX);
-    let again = gaussian(&luma, (width, height), DENOISE_PX.hypot(REBLUR_PX));
-    let mut soft = vec![f32::NAN; width * height];
+    let denoised = gaussian_blur(&luma, (width, height), DENOISE_PX);
+    let reblurred = gaussian_blur(&luma, (width, height), DENOISE_PX.hypot(REBLUR_PX));
+    let mut blur_px = vec![f32::NAN; width * height];
     for y in 1..height.max(1) - 1 {
         for x in 1..width.max(1) - 1 {
             let at = y * width + x;
             let gradient = |plane: &[f32], at: usize| {
                 [0.5 * (plane[at + 1] - plane[at - 1]), 0.5 * (plane[at + width] - plane[at - width])]
             };
-            let [across, down] = gradient(&own, at);
-            let steep = across.hypot(down);
-            if steep < MIN_GRADIENT {
+            let [across, down] = gradient(&denoised, at);
+            let magnitude = across.hypot(down);
+            if magnitude < MIN_GRADIENT {
                 continue;
             }
             // Non-maximum suppression: the ratio only holds where the gradient is largest across the edge.
-            let (dx, dy) = ((across / steep).round() as isize, (down / steep).round() as isize);
+            let (dx, dy) = ((across / magnitude).round() as isize, (down / magnitude).round() as isize);
             let beside = |way: isize| {
                 let (x, y) = (x.saturating_add_signed(way * dx), y.saturating_add_signed(way * dy));
                 if (1..width - 1).contains(&x) && (1..height - 1).contains(&y) {
-                    let [across, down] = gradient(&own, y * width + x);
+                    let [across, down] = gradient(&denoised, y * width + x);
                     across.hypot(down)
                 } else {
                     0.0
                 }
             };
-            if beside(1) > steep || beside(-1) >= steep {
+            if beside(1) > magnitude || beside(-1) >= magnitude {
                 continue;
             }
-            let [across, down] = gradient(&again, at);
-            let ratio = steep / across.hypot(down).max(1e-3);
-            let all_px = REBLUR_PX / (ratio * ratio - 1.0).max(1e-3).sqrt();
+            let [across, down] = gradient(&reblurred, at);
+            let ratio = magnitude / across.hypot(down).max(1e-3);
+            let total_px = REBLUR_PX / (ratio * ratio - 1.0).max(1e-3).sqrt();
             // Subtracts the variance of the denoising Gaussian, and that of the central difference over two pixels.
-            soft[at] = (all_px * all_px - DENOISE_PX * DENOISE_PX - 1.0 / 3.0).max(0.0).sqrt().min(MAX_BLUR_PX);
+            blur_px[at] = (total_px * total_px - DENOISE_PX * DENOISE_PX - 1.0 / 3.0).max(0.0).sqrt().min(MAX_BLUR_PX);
         }
     }
-    soft
+    blur_px
 }
 
 /// Returns the median edge blur of each square with enough edges, ascending.
-fn median_blurs(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
+fn compute_median_blurs(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
     let (across, down) = (width.div_ceil(SQUARE_PX), height.div_ceil(SQUARE_PX));
     let mut squares = vec![Vec::new(); across * down];
-    for (at, &soft) in edges.iter().enumerate().filter(|(_, soft)| soft.is_finite()) {
-        squares[at / width / SQUARE_PX * across + at % width / SQUARE_PX].push(soft);
+    for (at, &blur_px) in edges.iter().enumerate().filter(|(_, blur_px)| blur_px.is_finite()) {
+        squares[at / width / SQUARE_PX * across + at % width / SQUARE_PX].push(blur_px);
     }
     let many = squares.iter_mut().filter(|square| square.len() >= MIN_EDGES);
     let mut medians: Vec<f32> = many
@@ -132,7 +136,7 @@ fn median_blurs(edges: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
 }
 
 /// Applies a separable Gaussian blur; the border is replicated.
-fn gaussian(plane: &[f32], (width, height): (usize, usize), deviation_px: f32) -> Vec<f32> {
+fn gaussian_blur(plane: &[f32], (width, height): (usize, usize), deviation_px: f32) -> Vec<f32> {
     let radius = (3.0 * deviation_px).ceil() as isize;
     let weight = |k: isize| (-0.5 * (k as f32 / deviation_px).powi(2)).exp();
     let all: f32 = (-radius..=radius).map(weight).sum();
@@ -145,17 +149,17 @@ fn gaussian(plane: &[f32], (width, height): (usize, usize), deviation_px: f32) -
 }
 
 /// Propagates the known blur values along similar colours (domain transform, recursive filter). `known` belongs to a
-/// picture of `size` pixels, each of which covers `by` x `by` pixels of `color`. Values and weights are filtered alike
-/// (normalised convolution).
-fn propagate(color: &ColorImage, known: &[f32], (size, by): ((usize, usize), usize)) -> Vec<f32> {
+/// picture of `size` pixels, each of which covers `factor` x `factor` pixels of `color`. Values and weights are
+/// filtered alike (normalised convolution).
+fn propagate_blur(color: &ColorImage, known: &[f32], (size, factor): ((usize, usize), usize)) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut sums = vec![[0.0; 2]; width * height];
-    for (at, &soft) in known.iter().enumerate().filter(|(_, soft)| soft.is_finite()) {
-        let (x, y) = (at % size.0 * by + by / 2, at / size.0 * by + by / 2);
-        sums[y * width + x] = [soft, 1.0];
+    for (at, &blur_px) in known.iter().enumerate().filter(|(_, blur_px)| blur_px.is_finite()) {
+        let (x, y) = (at % size.0 * factor + factor / 2, at / size.0 * factor + factor / 2);
+        sums[y * width + x] = [blur_px, 1.0];
     }
     // The distance of neighbouring pixels in the transformed domain: one pixel plus the scaled colour difference.
-    let sigma_px = SPATIAL_SIGMA_PX * by as f32;
+    let sigma_px = SPATIAL_SIGMA_PX * factor as f32;
     let colors = |a: usize, b: usize| -> usize {
         (0..3).map(|p| usize::from(color.rgb[3 * a + p].abs_diff(color.rgb[3 * b + p]))).sum()
     };
@@ -191,11 +195,14 @@ mod tests {
         let mut picture = ColorImage::new(width as u32, height as u32);
         for (half, [dark, bright]) in [[30.0, 130.0], [130.0, 230.0]].into_iter().enumerate() {
             let hard = |at: usize| if (at % width / 20).is_multiple_of(2) { dark } else { bright };
-            let soft =
-                gaussian(&(0..width * height).map(hard).collect::<Vec<f32>>(), (width, height), deviation_px(half));
+            let blur_px = gaussian_blur(
+                &(0..width * height).map(hard).collect::<Vec<f32>>(),
+                (width, height),
+                deviation_px(half),
+            );
             let rows = half * height / 2 * width..(half + 1) * height / 2 * width;
-            for (pixel, soft) in picture.rgb.as_chunks_mut::<3>().0[rows.clone()].iter_mut().zip(&soft[rows]) {
-                pixel.fill(soft.round() as u8);
+            for (pixel, blur_px) in picture.rgb.as_chunks_mut::<3>().0[rows.clone()].iter_mut().zip(&blur_px[rows]) {
+                pixel.fill(blur_px.round() as u8);
             }
         }
         picture
@@ -204,8 +211,8 @@ mod tests {
     #[test]
     fn soft_edges_are_measured() {
         for deviation_px in [0.6, 1.0, 1.6, 2.4] {
-            let edges = edge_blur(&stripes(|_| deviation_px));
-            let known: Vec<f32> = edges.into_iter().filter(|soft| soft.is_finite()).collect();
+            let edges = estimate_edge_blur(&stripes(|_| deviation_px));
+            let known: Vec<f32> = edges.into_iter().filter(|blur_px| blur_px.is_finite()).collect();
             let mean = known.iter().sum::<f32>() / known.len() as f32;
             assert!(
                 known.len() > 500 && (mean - deviation_px).abs() < 0.1 * deviation_px + 0.1,
@@ -216,7 +223,7 @@ mod tests {
 
     #[test]
     fn what_is_soft_is_far_and_what_is_all_sharp_has_no_depth() {
-        let map = depth(&stripes(|half| if half == 0 { 0.5 } else { 2.0 })).unwrap();
+        let map = estimate_depth(&stripes(|half| if half == 0 { 0.5 } else { 2.0 })).unwrap();
         let at = |x: usize, y: usize| map.metres[y * 240 + x];
         assert!(
             at(120, 20) < 1.2 * DepthMap::SUBJECT_M && at(120, 140) > 4.0 * DepthMap::SUBJECT_M,
@@ -224,6 +231,6 @@ mod tests {
             at(120, 20),
             at(120, 140)
         );
-        assert!(depth(&stripes(|_| 0.5)).is_none() && depth(&ColorImage::new(64, 48)).is_none());
+        assert!(estimate_depth(&stripes(|_| 0.5)).is_none() && estimate_depth(&ColorImage::new(64, 48)).is_none());
     }
 }

@@ -6,12 +6,12 @@ pub fn dilate(plane: &mut [bool], line: &mut Vec<bool>, width: usize, radius_px:
     let mut along = |first: usize, step: usize, count: usize| {
         line.clear();
         line.extend((0..count).map(|k| plane[first + k * step]));
-        for back in [false, true] {
-            let mut left = 0;
-            for k in (0..count).map(|k| if back { count - 1 - k } else { k }) {
-                left = if line[k] { radius_px + 1 } else { left };
-                plane[first + k * step] |= left > 0;
-                left = left.saturating_sub(1);
+        for reversed in [false, true] {
+            let mut remaining = 0;
+            for k in (0..count).map(|k| if reversed { count - 1 - k } else { k }) {
+                remaining = if line[k] { radius_px + 1 } else { remaining };
+                plane[first + k * step] |= remaining > 0;
+                remaining = remaining.saturating_sub(1);
             }
         }
     };

@@ -18,7 +18,7 @@ use crate::frame::{ColorImage, DepthMap};
 
 /// Fills depth maps; owns its buffers and the last map that had any depth.
 #[derive(Debug, Default)]
-pub struct Filler {
+pub struct HoleFiller {
     arch: Arch,
     /// The holes, row by row, the rest of them after a pass, and the filled depths of a pass.
     holes: Vec<Run>,
@@ -30,7 +30,7 @@ pub struct Filler {
     guided: GuidedHoleFill,
 }
 
-impl Filler {
+impl HoleFiller {
     /// Creates a filler without a last map.
     pub fn new() -> Self {
         Self::default()
@@ -39,25 +39,25 @@ impl Filler {
     /// Fills every unknown depth of `map`, in time linear in its pixels. A map without any known depth becomes a copy
     /// of the last good one of its size; without one it stays unknown (0) everywhere.
     pub fn fill(&mut self, map: &mut DepthMap) {
-        if self.fill_all(map) {
-            self.keep(map);
+        if self.fill_from_background(map) {
+            self.store(map);
         }
     }
 
-    /// Fills like [`Filler::fill`], then corrects by `color`, the picture of the map: a pixel filled from the
+    /// Fills like [`HoleFiller::fill`], then corrects by `color`, the picture of the map: a pixel filled from the
     /// background takes the depth of the near object beside it if it has that object's colour.
     pub fn fill_guided(&mut self, map: &mut DepthMap, color: &ColorImage) {
-        if self.fill_once(map, color) {
-            self.keep(map);
+        if self.fill_without_storing(map, color) {
+            self.store(map);
         }
     }
 
-    /// Fills like [`Filler::fill_guided`] without keeping the map: returns whether to keep it, with
-    /// [`Filler::keep_by_swap`].
-    pub(super) fn fill_once(&mut self, map: &mut DepthMap, color: &ColorImage) -> bool {
-        let is_good = self.fill_all(map);
+    /// Fills like [`HoleFiller::fill_guided`] without keeping the map: returns whether to keep it, with
+    /// [`HoleFiller::store_by_swap`].
+    pub(super) fn fill_without_storing(&mut self, map: &mut DepthMap, color: &ColorImage) -> bool {
+        let is_good = self.fill_from_background(map);
         if is_good {
-            self.guided.claim(map, &self.holes, color);
+            self.guided.assign_to_foreground(map, &self.holes, color);
         }
         is_good
     }
@@ -68,16 +68,16 @@ impl Filler {
     }
 
     /// Keeps a map by swapping buffers: `map` then has the content of an earlier one.
-    pub(super) fn keep_by_swap(&mut self, map: &mut DepthMap) {
+    pub(super) fn store_by_swap(&mut self, map: &mut DepthMap) {
         self.last_good.resize(map.width, map.height);
         mem::swap(&mut self.last_good.metres, &mut map.metres);
     }
 
     /// Fills the holes; returns whether any depth was known.
-    fn fill_all(&mut self, map: &mut DepthMap) -> bool {
+    fn fill_from_background(&mut self, map: &mut DepthMap) -> bool {
         let Self { arch, holes, left, filled_m, column_m, .. } = self;
         holes.clear();
-        arch.dispatch(FindHoles { map, holes });
+        arch.dispatch(FindHoleRuns { map, holes });
         if holes.iter().map(|hole| hole.range().len()).sum::<usize>() == map.metres.len() {
             if self.last_good.size() == map.size() {
                 map.metres.copy_from_slice(&self.last_good.metres);
@@ -93,7 +93,7 @@ impl Filler {
             let width = map.width as usize;
             left.clear();
             for &hole in &*holes {
-                left.extend(self::holes(&map.metres[hole.pixels(width)]).map(|of_hole| Run {
+                left.extend(self::find_holes(&map.metres[hole.pixels(width)]).map(|of_hole| Run {
                     start: hole.start + of_hole.start as u32,
                     end: hole.start + of_hole.end as u32,
                     ..hole
@@ -104,26 +104,26 @@ impl Filler {
         true
     }
 
-    fn keep(&mut self, map: &DepthMap) {
+    fn store(&mut self, map: &DepthMap) {
         self.last_good.resize(map.width, map.height);
         self.last_good.metres.copy_from_slice(&map.metres);
     }
 }
 
 /// Finds the holes of a map, row by row.
-struct FindHoles<'a> {
+struct FindHoleRuns<'a> {
     map: &'a DepthMap,
     holes: &'a mut Vec<Run>,
 }
 
-impl WithSimd for FindHoles<'_> {
+impl WithSimd for FindHoleRuns<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { map, holes } = self;
         for (line, row) in map.metres.chunks_exact((map.width as usize).max(1)).enumerate() {
             let run = |Range { start, end }| Run { line: line as u32, start: start as u32, end: end as u32 };
-            holes.extend(self::holes(row).map(run));
+            holes.extend(self::find_holes(row).map(run));
         }
     }
 }
@@ -206,7 +206,7 @@ const SKIP_BLOCK: usize = 16;
 
 /// Returns the column ranges of the runs of unknown depths in a row.
 #[inline(always)]
-pub(super) fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn find_holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
     let mut next = 0;
     iter::from_fn(move || {
         // Most pixels are known. `&` instead of an early exit, so that the test of a block becomes vector code.

@@ -17,7 +17,7 @@ const MIN_FRACTION: f32 = 0.005;
 /// upper bound is lower, to keep the hair.
 const BOUND_QUANTILES: [[f32; 2]; 2] = [[0.04, 0.96], [0.01, 0.96]];
 /// Maximum width and height of the subject, and the headroom above it, as fractions of the crop.
-const MAX_FILL: [f32; 2] = [0.75, 0.8];
+const MAX_SUBJECT_SIDES: [f32; 2] = [0.75, 0.8];
 const HEADROOM: f32 = 0.09;
 /// Hysteresis: a resting crop starts to move when the error exceeds `START`, and rests again below `STOP`. Both are in
 /// sides of the crop, or in the logarithm of the zoom.
@@ -64,10 +64,10 @@ impl AutoFraming {
 
     /// Returns the crop for the frame at `time_ns` of media time, whose depth map has no holes. The first frame sets it
     /// at once.
-    pub fn crop(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
+    pub fn update_crop(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
         let seen = self.find_target(map, lens);
         let follows = self.time_ns.filter(|&last_ns| (last_ns..=last_ns + MAX_GAP_NS).contains(&time_ns));
-        let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { state_of(Crop::WHOLE) });
+        let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { crop_state(Crop::WHOLE) });
         match follows {
             None => (self.place, self.target, self.speed, self.is_moving) = (wanted, wanted, [0.0; 3], false),
             Some(last_ns) => {
@@ -75,7 +75,7 @@ impl AutoFraming {
                 self.is_moving = distance > if self.is_moving { STOP } else { START };
                 if self.is_moving {
                     self.target = wanted;
-                    self.advance((time_ns - last_ns) as f32 * 1e-9);
+                    self.advance_spring((time_ns - last_ns) as f32 * 1e-9);
                 } else {
                     self.speed = [0.0; 3];
                 }
@@ -87,15 +87,15 @@ impl AutoFraming {
     }
 
     /// Advances the spring by `passed_s` seconds.
-    fn advance(&mut self, passed_s: f32) {
+    fn advance_spring(&mut self, passed_s: f32) {
         let rate = TIME_CONSTANT_S.recip();
-        let fall = (-rate * passed_s).exp();
+        let decay = (-rate * passed_s).exp();
         for ((place, speed), target) in self.place.iter_mut().zip(&mut self.speed).zip(self.target) {
             // The exact solution of the critically damped spring: independent of the frame rate.
-            let off = *place - target;
-            let pull = *speed + rate * off;
-            *place = target + (off + pull * passed_s) * fall;
-            *speed = (*speed - rate * pull * passed_s) * fall;
+            let offset = *place - target;
+            let pull = *speed + rate * offset;
+            *place = target + (offset + pull * passed_s) * decay;
+            *speed = (*speed - rate * pull * passed_s) * decay;
         }
     }
 
@@ -133,16 +133,17 @@ impl AutoFraming {
         };
         let [left, right] = BOUND_QUANTILES[0].map(|quantile| place(&self.columns, quantile));
         let [top, bottom] = BOUND_QUANTILES[1].map(|quantile| place(&self.rows, quantile));
-        let zoom = (MAX_FILL[0] / (right - left).max(1e-3)).min(MAX_FILL[1] / (bottom - top).max(1e-3));
+        let zoom =
+            (MAX_SUBJECT_SIDES[0] / (right - left).max(1e-3)).min(MAX_SUBJECT_SIDES[1] / (bottom - top).max(1e-3));
         let zoom = zoom.clamp(1.0, self.max_zoom);
         let middle = 0.5 * (top + bottom);
         // Centred on the subject, but with no more than the headroom above it.
         let below_headroom = top + (0.5 - HEADROOM) / zoom;
-        Some(state_of(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
+        Some(crop_state(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
     }
 }
 
-fn state_of(Crop { center: [x, y], zoom }: Crop) -> [f32; 3] {
+fn crop_state(Crop { center: [x, y], zoom }: Crop) -> [f32; 3] {
     [x, y, zoom.ln()]
 }
 
@@ -179,7 +180,7 @@ mod tests {
     #[test]
     fn the_first_frame_shows_the_subject_at_once_and_no_larger_than_was_said() {
         for most in [1.2, 1.5, 3.0] {
-            let part = AutoFraming::new(most).crop(&person(0.4), &LENS, 7);
+            let part = AutoFraming::new(most).update_crop(&person(0.4), &LENS, 7);
             assert!((part.center[0] - 0.4).abs() < 0.02 || part.zoom < 1.3, "{part:?}");
             assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
             let top = part.center[1] - 0.5 / part.zoom;
@@ -192,8 +193,8 @@ mod tests {
     fn it_glides_to_where_the_subject_went_without_passing_it_and_rests() {
         let mut follower = AutoFraming::new(1.6);
         let (before, after) = (person(0.44), person(0.56));
-        let first = follower.crop(&before, &LENS, 0);
-        let places: Vec<f32> = (1..90).map(|k| follower.crop(&after, &LENS, k * PERIOD_NS).center[0]).collect();
+        let first = follower.update_crop(&before, &LENS, 0);
+        let places: Vec<f32> = (1..90).map(|k| follower.update_crop(&after, &LENS, k * PERIOD_NS).center[0]).collect();
         assert!(places.is_sorted(), "{places:?}");
         let last = *places.last().unwrap();
         assert!((last - 0.56).abs() < 0.01 && first.center[0] < 0.45);
@@ -205,21 +206,21 @@ mod tests {
     #[test]
     fn small_movements_and_frames_without_a_subject_leave_it_where_it_is() {
         let mut follower = AutoFraming::new(1.6);
-        let first = follower.crop(&person(0.5), &LENS, 0);
+        let first = follower.update_crop(&person(0.5), &LENS, 0);
         let empty = DepthMap { metres: vec![9.0; 320 * 180], ..DepthMap::new(320, 180) };
         for k in 1..60 {
             let map = if k % 7 == 0 { empty.clone() } else { person(0.5 + 0.02 * ((k % 3) as f32 - 1.0)) };
-            assert_eq!(follower.crop(&map, &LENS, k * PERIOD_NS), first);
+            assert_eq!(follower.update_crop(&map, &LENS, k * PERIOD_NS), first);
         }
-        assert_eq!(AutoFraming::new(2.0).crop(&empty, &LENS, 0), Crop::WHOLE);
+        assert_eq!(AutoFraming::new(2.0).update_crop(&empty, &LENS, 0), Crop::WHOLE);
     }
 
     #[test]
     fn how_many_frames_there_are_makes_no_difference() {
         let places = |every: u64| {
             let mut follower = AutoFraming::new(1.6);
-            follower.crop(&person(0.4), &LENS, 0);
-            (1..=12 / every).map(|k| follower.crop(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
+            follower.update_crop(&person(0.4), &LENS, 0);
+            (1..=12 / every).map(|k| follower.update_crop(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
         };
         let (often, rarely) = (places(1), places(3));
         assert!((often.center[0] - rarely.center[0]).abs() < 1e-3, "{often:?} {rarely:?}");

@@ -15,9 +15,9 @@ pub const SAME_SURFACE: f32 = 1.15;
 /// Known pixels beside a hole in the mean colour of that side.
 pub const SAMPLE_PX: usize = 4;
 /// A pixel belongs to the near side if its colour is closer to it by this factor than to the far side's.
-pub const PREFERENCE: f32 = 1.3;
+pub const COLOR_PREFERENCE: f32 = 1.3;
 /// Rate at which the near side's colour follows the claimed pixels.
-pub const FOLLOW: f32 = 0.2;
+pub const COLOR_UPDATE_RATE: f32 = 0.2;
 /// Largest width of a sensor's occlusion shadow, as a fraction of the picture's width.
 const MAX_SHADOW_FRACTION: f32 = 0.12;
 
@@ -81,7 +81,7 @@ impl Line {
 impl GuidedHoleFill {
     /// Assigns `holes`, row by row, of a map filled from the background to the near side if they have its colour, along
     /// rows and then, for the rest, along columns. Does nothing if picture and map differ in size.
-    pub fn claim(&mut self, map: &mut DepthMap, holes: &[Run], color: &ColorImage) {
+    pub fn assign_to_foreground(&mut self, map: &mut DepthMap, holes: &[Run], color: &ColorImage) {
         let (width, height) = (map.width as usize, map.height as usize);
         if color.size() != map.size() || holes.is_empty() {
             return;
@@ -89,10 +89,10 @@ impl GuidedHoleFill {
         self.claims_m.resize(width * height, 0.0);
         self.is_hole.resize(width * height, false);
         holes.iter().for_each(|hole| self.is_hole[hole.pixels(width)].fill(true));
-        let longest = longest(width);
+        let max_hole_px = max_hole_px(width);
         for &hole in holes {
             let line = Line { first: hole.line as usize * width, step: 1, length: width };
-            let claimed = claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
+            let claimed = claim_hole(line, hole.range(), max_hole_px, &map.metres, &color.rgb, &mut self.claims_m);
             self.claimed.extend(claimed);
         }
         self.accept_claims(width, map);
@@ -101,9 +101,9 @@ impl GuidedHoleFill {
             let (column, start) = (entry % width, entry / width);
             let is_hole = |&y: &usize| self.is_hole[y * width + column];
             // Searches one row more than the limit, to detect holes that are too long.
-            let end = (start..height.min(start + longest + 1)).take_while(is_hole).count() + start;
+            let end = (start..height.min(start + max_hole_px + 1)).take_while(is_hole).count() + start;
             let line = Line { first: column, step: width, length: height };
-            let claimed = claim_run(line, start..end, longest, &map.metres, &color.rgb, &mut self.claims_m);
+            let claimed = claim_hole(line, start..end, max_hole_px, &map.metres, &color.rgb, &mut self.claims_m);
             self.claimed.extend(claimed);
         }
         self.accept_claims(1, map);
@@ -148,7 +148,7 @@ impl GuidedHoleFill {
 }
 
 /// Returns the longest hole that may be the near side's, in pixels of a picture with `width` columns.
-pub fn longest(width: usize) -> usize {
+pub fn max_hole_px(width: usize) -> usize {
     ((width as f32 * MAX_SHADOW_FRACTION) as usize).max(4)
 }
 
@@ -156,17 +156,17 @@ pub fn longest(width: usize) -> usize {
 const BLOCK: usize = 32;
 
 /// Claims pixels of a hole in a line for the near side; returns the claimed segment.
-fn claim_run(
+fn claim_hole(
     line: Line,
     hole: Range<usize>,
-    longest: usize,
+    max_hole_px: usize,
     metres: &[f32],
     rgb: &[u8],
     claims_m: &mut [f32],
 ) -> Option<Line> {
     let Range { start, end } = hole;
     // Holes at the border have only one side; longer ones are not a shadow.
-    if start == 0 || end == line.length || end - start > longest {
+    if start == 0 || end == line.length || end - start > max_hole_px {
         return None;
     }
     let (before_m, after_m) = (metres[line.at(start - 1)], metres[line.at(end)]);
@@ -175,11 +175,11 @@ fn claim_run(
         (before, mean_color(rgb, line, end..(end + SAMPLE_PX).min(line.length)))
     };
     let claimed = if before_m * SAME_SURFACE < after_m {
-        let count = grow(line, hole, before_m, colors(), rgb, claims_m);
+        let count = grow_region(line, hole, before_m, colors(), rgb, claims_m);
         start..start + count
     } else if after_m * SAME_SURFACE < before_m {
         let (before, after) = colors();
-        let count = grow(line, hole.rev(), after_m, (after, before), rgb, claims_m);
+        let count = grow_region(line, hole.rev(), after_m, (after, before), rgb, claims_m);
         end - count..end
     } else {
         return None;
@@ -188,7 +188,7 @@ fn claim_run(
 }
 
 /// Claims pixels in order while their colour is closer to the near side's than to the far side's; returns their number.
-fn grow(
+fn grow_region(
     line: Line,
     pixels: impl Iterator<Item = usize>,
     near_m: f32,
@@ -199,11 +199,11 @@ fn grow(
     let mut count = 0;
     for k in pixels {
         let own = mean_color(rgb, line, k..k + 1);
-        if distance(own, near) * PREFERENCE >= distance(own, far) {
+        if color_distance(own, near) * COLOR_PREFERENCE >= color_distance(own, far) {
             break;
         }
         claims_m[line.at(k)] = near_m;
-        near = std::array::from_fn(|p| near[p] + FOLLOW * (own[p] - near[p]));
+        near = std::array::from_fn(|p| near[p] + COLOR_UPDATE_RATE * (own[p] - near[p]));
         count += 1;
     }
     count
@@ -214,7 +214,7 @@ fn mean_color(rgb: &[u8], line: Line, pixels: Range<usize>) -> [f32; 3] {
     std::array::from_fn(|p| pixels.clone().map(|k| f32::from(rgb[3 * line.at(k) + p])).sum::<f32>() / count)
 }
 
-fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+fn color_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|p| (a[p] - b[p]).powi(2)).sum::<f32>().sqrt()
 }
 
@@ -234,7 +234,7 @@ mod tests {
             color.rgb[3 * k..3 * k + 3].copy_from_slice(if x < 45 { &[40, 30, 25] } else { &[180, 190, 185] });
         }
         let holes: Vec<Run> = (0..height).map(|line| Run { line, start: 40, end: 48 }).collect();
-        GuidedHoleFill::default().claim(&mut map, &holes, &color);
+        GuidedHoleFill::default().assign_to_foreground(&mut map, &holes, &color);
         for (k, &metres) in map.metres.iter().enumerate() {
             assert_eq!(metres, if k % 80 < 45 { 1.0 } else { 3.0 }, "column {}", k % 80);
         }
@@ -251,9 +251,9 @@ mod tests {
         let before = map.clone();
         let holes = [0, 1, 2].map(|line| Run { line, start: 3, end: 6 });
         let mut guided = GuidedHoleFill::default();
-        guided.claim(&mut map, &holes, &ColorImage::new(9, 3));
+        guided.assign_to_foreground(&mut map, &holes, &ColorImage::new(9, 3));
         assert_eq!(map, before);
-        guided.claim(&mut map, &holes, &ColorImage::new(3, 1));
+        guided.assign_to_foreground(&mut map, &holes, &ColorImage::new(3, 1));
         assert_eq!(map, before);
     }
 }

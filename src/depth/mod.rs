@@ -6,20 +6,20 @@ pub mod agreement;
 mod alignment;
 pub mod backdrop;
 pub mod background;
-#[cfg(feature = "files")]
-pub mod beside;
-mod bits;
+mod bitmap;
+pub mod constant;
 pub mod defocus;
 mod dilation;
 pub mod fill;
 pub mod focus;
 pub mod follow;
 mod guided_fill;
-pub mod kept;
 #[cfg(feature = "camera")]
 pub mod live;
+#[cfg(feature = "files")]
+pub mod looped_recording;
 pub mod matting;
-pub mod misfit;
+pub mod misalignment;
 pub mod motion;
 pub mod plate;
 #[cfg(feature = "files")]
@@ -122,7 +122,7 @@ pub enum DepthError {
     Match(#[from] stereo::MatchError),
     /// A stereo frame lacks the picture of the right camera.
     #[error("{source_name}: this frame has no right picture")]
-    OneEye {
+    MissingRight {
         /// Name of the frame source.
         source_name: String,
     },

@@ -7,12 +7,12 @@ use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
 /// The depth pictures of a recording.
-pub struct Recorded {
+pub struct RecordedDepth {
     recording: Arc<Recording>,
     scratch: Scratch,
 }
 
-impl Recorded {
+impl RecordedDepth {
     /// Reads the depth of `recording`, which messages call `name`.
     ///
     /// # Errors
@@ -26,7 +26,7 @@ impl Recorded {
     }
 }
 
-impl DepthSource for Recorded {
+impl DepthSource for RecordedDepth {
     fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         Ok(self.recording.read_depth(stamp.index, &mut self.scratch, map)?)
     }

@@ -42,15 +42,15 @@ pub fn reduced_size(color: &ColorImage) -> (usize, usize) {
 impl Reducer {
     /// Returns the square root of the linear light of a code, 0 to 255, scaled to [`MAX_VALUE`].
     #[inline(always)]
-    pub fn root(&self, code: f32) -> f32 {
+    pub fn sqrt_light(&self, code: f32) -> f32 {
         let first = code as u8;
         let [a, b] = [self.roots[usize::from(first)], self.roots[usize::from(first) + 1]];
         a + (b - a) * (code - f32::from(first))
     }
 
-    /// Inverts [`Reducer::root`].
+    /// Inverts [`Reducer::sqrt_light`].
     #[inline(always)]
-    fn code(&self, root: f32) -> f32 {
+    fn code_from_sqrt(&self, root: f32) -> f32 {
         let next = self.roots[1..256].partition_point(|&other| other <= root) + 1;
         let [a, b] = [self.roots[next - 1], self.roots[next]];
         if b > a { (next - 1) as f32 + ((root - a) / (b - a)).min(1.0) } else { 255.0 }
@@ -59,14 +59,14 @@ impl Reducer {
     /// Returns the code before multiplication of its root by `gain`.
     #[inline(always)]
     pub fn without_gain(&self, code: u8, gain: f32) -> u8 {
-        (self.code((self.root(f32::from(code)) / gain).min(MAX_VALUE)) + 0.5) as u8
+        (self.code_from_sqrt((self.sqrt_light(f32::from(code)) / gain).min(MAX_VALUE)) + 0.5) as u8
     }
 
     /// Computes the linear light of each code, by channel, after multiplication of the root by a gain per channel.
-    pub fn expose(&self, gain: [f32; 3], light: &mut [[f32; 256]; 3]) {
+    pub fn fill_exposure_tables(&self, gain: [f32; 3], light: &mut [[f32; 256]; 3]) {
         for (light, gain) in light.iter_mut().zip(gain) {
             // The gain applies to roots of light.
-            let exposed = |code: usize| (gain * self.root(code as f32) / MAX_VALUE).powi(2).min(1.0);
+            let exposed = |code: usize| (gain * self.sqrt_light(code as f32) / MAX_VALUE).powi(2).min(1.0);
             light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
         }
     }
@@ -96,7 +96,7 @@ impl Reducer {
         }
         for block in 0..across {
             let columns = block * block_px..((block + 1) * block_px).min(width);
-            let share = 1.0 / (columns.len() * lines.len()) as f32;
+            let weight = 1.0 / (columns.len() * lines.len()) as f32;
             let mut sums = [0; 3];
             for pixel in self.sums[3 * columns.start..3 * columns.end].chunks_exact(3) {
                 for p in 0..3 {
@@ -105,7 +105,7 @@ impl Reducer {
             }
             let mut roots = [0.0; 3];
             for p in 0..3 {
-                roots[p] = self.root(sums[p] as f32 * share);
+                roots[p] = self.sqrt_light(sums[p] as f32 * weight);
             }
             reduced.push(roots);
         }
@@ -145,7 +145,10 @@ mod tests {
             reducer.reduce(&picture, &mut reduced);
             let (across, down) = reduced_size(&picture);
             assert_eq!(reduced.len(), across * down);
-            assert!(across <= 480 && reduced.iter().flatten().all(|&value| (value - reducer.root(100.0)).abs() < 1e-3));
+            assert!(
+                across <= 480
+                    && reduced.iter().flatten().all(|&value| (value - reducer.sqrt_light(100.0)).abs() < 1e-3)
+            );
         }
     }
 }

@@ -5,7 +5,7 @@
 
 mod draw;
 
-use draw::Draw;
+use draw::DrawSquares;
 use glam::{Mat3, Vec3};
 use pulp::Arch;
 
@@ -59,7 +59,7 @@ pub enum CalibrationError {
 const ROTATION_TOLERANCE: f32 = 1e-2;
 
 impl Pinhole {
-    fn check(&self) -> Result<(), &'static str> {
+    fn validate(&self) -> Result<(), &'static str> {
         const MAX_SIDE_PX: u32 = 8192;
         let in_range = |side: u32| (1..=MAX_SIDE_PX).contains(&side);
         if !in_range(self.width) || !in_range(self.height) {
@@ -98,9 +98,9 @@ impl Calibration {
     ///
     /// # Errors
     /// Fails if a number is out of range, or the rotation matrix is not a rotation.
-    pub fn check(&self) -> Result<(), CalibrationError> {
-        self.depth.check().map_err(CalibrationError::Depth)?;
-        self.color.check().map_err(CalibrationError::Color)?;
+    pub fn validate(&self) -> Result<(), CalibrationError> {
+        self.depth.validate().map_err(CalibrationError::Depth)?;
+        self.color.validate().map_err(CalibrationError::Color)?;
         let unit = self.rotation * self.rotation.transpose() - Mat3::IDENTITY;
         let off = unit.to_cols_array().into_iter().fold(0.0, |most: f32, off| most.max(off.abs()));
         // The negated comparison also rejects NaN.
@@ -137,7 +137,7 @@ impl Registration {
     /// # Errors
     /// Fails if the calibration is invalid.
     pub fn new(calibration: Calibration) -> Result<Self, CalibrationError> {
-        calibration.check()?;
+        calibration.validate()?;
         let Calibration { depth, color: out, .. } = calibration;
         let (columns, rows, arch) = (Vec::new(), Vec::new(), Arch::new());
         Ok(Self { calibration, size: (0, 0), depth, out, columns, rows, arch })
@@ -150,7 +150,7 @@ impl Registration {
             self.update_tables(from.size());
         }
         into.resize(self.out.width, self.out.height);
-        self.arch.dispatch(Draw { registration: self, from: &from.metres, into: &mut into.metres });
+        self.arch.dispatch(DrawSquares { registration: self, from: &from.metres, into: &mut into.metres });
     }
 
     /// Computes the tables for maps of another size.

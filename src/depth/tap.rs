@@ -30,6 +30,6 @@ impl Tap {
 }
 
 /// Returns the index in a plane of `width` x `height` for pixel index `at` of a plane of `size`.
-pub fn nearest(at: usize, size: (usize, usize), (width, height): (usize, usize)) -> usize {
+pub fn nearest_index(at: usize, size: (usize, usize), (width, height): (usize, usize)) -> usize {
     at / size.0 * height / size.1 * width + at % size.0 * width / size.0
 }

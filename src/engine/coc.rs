@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Device, DeviceFrame};
 use crate::depth::background::BackgroundMemory;
-use crate::depth::fill::Filler;
+use crate::depth::fill::HoleFiller;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
 use crate::depth::refine::{MapCorrection, Refiner};
@@ -49,7 +49,7 @@ pub struct CocCalculator {
 
 enum Postprocessor {
     Keep,
-    Fill(Box<Filler>),
+    Fill(Box<HoleFiller>),
     Refine(Box<Refiner>),
 }
 
@@ -176,7 +176,7 @@ impl CocCalculator {
         self.focus = Focus::new(focus_rule(self.rule));
         match &mut self.postprocessor {
             Postprocessor::Keep => {}
-            Postprocessor::Fill(filler) => **filler = Filler::new(),
+            Postprocessor::Fill(filler) => **filler = HoleFiller::new(),
             Postprocessor::Refine(refiner) => refiner.reset(),
         }
         self.background = self.background.take().map(|_| BackgroundMemory::default());
@@ -186,7 +186,7 @@ impl CocCalculator {
     pub fn set_rule(&mut self, rule: CocRule, postprocess: Postprocess) {
         match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
-                self.focus.follow(focus);
+                self.focus.set_rule(focus);
                 self.set_postprocess(postprocess);
             }
             _ => {

@@ -1,6 +1,6 @@
 //! Composes the subject: virtual background and auto-framing.
 
-use crate::depth::backdrop::{Behind, VirtualBackground};
+use crate::depth::backdrop::{Background, VirtualBackground};
 use crate::depth::follow::AutoFraming;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
@@ -48,7 +48,7 @@ impl Composer {
 
     /// Follows another look.
     pub fn set_look(&mut self, look: &Look) {
-        if self.backdrop.as_ref().map_or(&Behind::Blur, VirtualBackground::behind) != &look.background {
+        if self.backdrop.as_ref().map_or(&Background::Blur, VirtualBackground::background) != &look.background {
             self.backdrop = VirtualBackground::new(&look.background);
         }
         match (&mut self.follower, look.follow.zoom()) {
@@ -72,7 +72,7 @@ impl Composer {
         time_ns: u64,
     ) -> Option<Crop> {
         let CocField::Depth(lens) = field else { return None };
-        let crop = self.follower.as_mut().map(|follower| follower.crop(map, lens, time_ns));
+        let crop = self.follower.as_mut().map(|follower| follower.update_crop(map, lens, time_ns));
         if let Some(backdrop) = &mut self.backdrop {
             backdrop.replace_background(color, map, lens);
         }

@@ -1,7 +1,7 @@
 //! Checks, in some of the first frames, whether the depth of a stream is aligned with its pictures.
 
 use crate::depth::agreement::EdgeAlignment;
-use crate::depth::misfit::Misalignment;
+use crate::depth::misalignment::Misalignment;
 use crate::depth::refine::MapCorrection;
 use crate::frame::{ColorImage, DepthMap};
 
@@ -54,11 +54,11 @@ impl FitCheck {
             return None;
         }
         let outlines = EdgeAlignment::measure(map, color);
-        let misfit = Misalignment::from_alignment(outlines, map, color);
-        match misfit.and_then(|misfit| Some((misfit, misfit.correction(map, color)?))) {
+        let misalignment = Misalignment::from_alignment(outlines, map, color);
+        match misalignment.and_then(|misalignment| Some((misalignment, misalignment.correction(map, color)?))) {
             Some(correction) => self.corrections.push(correction),
-            None if misfit.is_some() => self.unregistered += 1,
-            None if outlines == EdgeAlignment::Meets => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
+            None if misalignment.is_some() => self.unregistered += 1,
+            None if outlines == EdgeAlignment::Aligned => (self.frames, self.is_aligned) = (MAX_FRAMES, true),
             None => {}
         }
         let verdict = match () {
@@ -68,7 +68,7 @@ impl FitCheck {
                 .corrections
                 .iter()
                 .min_by_key(|(_, correction)| (correction.distance_px.abs(), correction.coarsest))
-                .map(|&(misfit, correction)| Verdict::Misaligned(misfit, correction)),
+                .map(|&(misalignment, correction)| Verdict::Misaligned(misalignment, correction)),
             () => None,
         };
         if verdict.is_some() {

@@ -175,10 +175,10 @@ impl Preprocessor {
                         .to_owned(),
                 );
             }
-            Some(Verdict::Misaligned(misfit, correction)) => {
+            Some(Verdict::Misaligned(misalignment, correction)) => {
                 if self.coc.set_correction(correction) {
                     let line = format!(
-                        "depth is aligned with the pictures, as {misfit}; --refine off uses it \
+                        "depth is aligned with the pictures, as {misalignment}; --refine off uses it \
                                         unchanged"
                     );
                     self.warning = Some(line);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
-use crate::depth::backdrop::{BackgroundPicture, Behind};
+use crate::depth::backdrop::{Background, BackgroundPicture};
 use crate::recording::RecordingError;
 use crate::recording::still::read_color;
 
@@ -13,7 +13,7 @@ use crate::recording::still::read_color;
 #[derive(Clone, Debug, PartialEq)]
 pub enum BackgroundSetting {
     /// Blur, a colour, or a picture that was read.
-    Loaded(Behind),
+    Loaded(Background),
     /// `image:FILE`, not read yet.
     Image(PathBuf),
 }
@@ -23,13 +23,13 @@ impl FromStr for BackgroundSetting {
     fn from_str(text: &str) -> Result<Self, String> {
         const FORMS: &str = "use blur, color:#RRGGBB or image:FILE";
         match text.split_once(':') {
-            None if text == "blur" => Some(Self::Loaded(Behind::Blur)),
-            Some(("color", color)) => parse_rgb(color).map(|rgb| Self::Loaded(Behind::Color(rgb))),
+            None if text == "blur" => Some(Self::Loaded(Background::Blur)),
+            Some(("color", color)) => parse_rgb(color).map(|rgb| Self::Loaded(Background::Color(rgb))),
             Some(("image", file)) if !file.is_empty() => Some(Self::Image(file.into())),
             None if let Some((_, rgb)) = COLORS.iter().find(|(name, _)| *name == text) => {
-                Some(Self::Loaded(Behind::Color(*rgb)))
+                Some(Self::Loaded(Background::Color(*rgb)))
             }
-            None if text.starts_with('#') => parse_rgb(text).map(|rgb| Self::Loaded(Behind::Color(rgb))),
+            None if text.starts_with('#') => parse_rgb(text).map(|rgb| Self::Loaded(Background::Color(rgb))),
             // A file name with a picture's extension needs no `image:`.
             _ if is_picture(text) => Some(Self::Image(text.into())),
             _ => None,
@@ -66,9 +66,9 @@ impl fmt::Display for BackgroundSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Image(file) => write!(f, "image:{}", file.display()),
-            Self::Loaded(Behind::Blur) => f.write_str("blur"),
-            Self::Loaded(Behind::Color([red, green, blue])) => write!(f, "color:#{red:02x}{green:02x}{blue:02x}"),
-            Self::Loaded(Behind::Picture(picture)) => match &picture.file {
+            Self::Loaded(Background::Blur) => f.write_str("blur"),
+            Self::Loaded(Background::Color([red, green, blue])) => write!(f, "color:#{red:02x}{green:02x}{blue:02x}"),
+            Self::Loaded(Background::Picture(picture)) => match &picture.file {
                 Some(file) => write!(f, "image:{}", file.display()),
                 None => f.write_str("image"),
             },
@@ -78,9 +78,9 @@ impl fmt::Display for BackgroundSetting {
 
 impl BackgroundSetting {
     /// Returns the setting for a background; `None` for a picture without a known file.
-    pub fn from_background(behind: &Behind) -> Option<Self> {
+    pub fn from_background(behind: &Background) -> Option<Self> {
         match behind {
-            Behind::Picture(picture) if picture.file.is_none() => None,
+            Background::Picture(picture) if picture.file.is_none() => None,
             behind => Some(Self::Loaded(behind.clone())),
         }
     }
@@ -89,11 +89,11 @@ impl BackgroundSetting {
     ///
     /// # Errors
     /// The picture of `image:FILE` cannot be read.
-    pub fn load(&self) -> Result<Behind, RecordingError> {
+    pub fn load(&self) -> Result<Background, RecordingError> {
         Ok(match self {
             Self::Loaded(behind) => behind.clone(),
             Self::Image(file) => {
-                Behind::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image: read_color(file)? }))
+                Background::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image: read_color(file)? }))
             }
         })
     }

@@ -38,7 +38,7 @@ pub use tilt::Tilt;
 
 use crate::bokeh::{self, aperture::Aperture};
 use crate::budget::Quality;
-use crate::depth::backdrop::Behind;
+use crate::depth::backdrop::Background;
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, CocKind};
 
@@ -79,7 +79,7 @@ pub struct Look {
     /// Whether a stream remembers the background that objects hide.
     pub background_memory: BackgroundMemory,
     /// The background behind the subject.
-    pub background: Behind,
+    pub background: Background,
     /// Whether a stream keeps the subject centred.
     pub follow: FramingZoom,
     /// The band of the effect `tilt-shift`.
@@ -107,7 +107,7 @@ impl Default for Look {
             max_coc_px: None,
             refine: Refine::Auto,
             background_memory: BackgroundMemory::On,
-            background: Behind::Blur,
+            background: Background::Blur,
             follow: FramingZoom::OFF,
             tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::settings::{SETTINGS, Setting, find_setting};
 use super::{ApertureSetting, BackgroundSetting, Look, Patch, Strength};
 use crate::bokeh::aperture::Shape;
-use crate::depth::backdrop::Behind;
+use crate::depth::backdrop::Background;
 use crate::optics::Lens;
 use crate::recording::RecordingError;
 
@@ -139,8 +139,8 @@ impl Patch {
         }
         match (&self.behind, &look.background) {
             (None, _) => {}
-            (Some(BackgroundSetting::Image(file)), Behind::Picture(picture)) if picture.file.as_ref() == Some(file) => {
-            }
+            (Some(BackgroundSetting::Image(file)), Background::Picture(picture))
+                if picture.file.as_ref() == Some(file) => {}
             (Some(name), _) => look.background = name.load()?,
         }
         if let Some(intensity) = self.intensity {

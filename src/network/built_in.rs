@@ -6,7 +6,7 @@ use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView}
 use rten_tensor::TensorView;
 use rten_tensor::prelude::*;
 
-use super::{Engine, Network, Port, Tensor, one_line, onnx};
+use super::{Engine, Network, Port, Tensor, onnx, to_one_line};
 
 /// A network run by the built-in runtime.
 pub struct BuiltIn {
@@ -17,15 +17,15 @@ pub struct BuiltIn {
 
 impl BuiltIn {
     pub fn load(bytes: Vec<u8>) -> Result<Network, String> {
-        let model = Model::load(onnx::remove_output_shapes(bytes)?).map_err(one_line)?;
-        let ports = |ids: &[NodeId]| ids.iter().map(|&id| port(&model, id)).collect::<Result<Vec<_>, _>>();
+        let model = Model::load(onnx::remove_output_shapes(bytes)?).map_err(to_one_line)?;
+        let ports = |ids: &[NodeId]| ids.iter().map(|&id| read_port(&model, id)).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(model.input_ids())?, ports(model.output_ids())?);
         let engine = Box::new(Self { model, threads: Arc::new(ThreadPool::with_num_threads(1)) });
         Ok(Network { engine, inputs, outputs, runtime: "the built-in runtime".to_owned() })
     }
 }
 
-fn port(model: &Model, id: NodeId) -> Result<Port, String> {
+fn read_port(model: &Model, id: NodeId) -> Result<Port, String> {
     let info = model.node_info(id).ok_or("a port without a description")?;
     let shape = info.shape().unwrap_or_default();
     let side = |dimension: &Dimension| match dimension {
@@ -39,11 +39,11 @@ impl Engine for BuiltIn {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
         let given = self.model.input_ids().iter().zip(inputs).map(|(&id, Tensor { shape, values })| {
             let view = TensorView::try_from_data(shape.as_slice(), values.as_slice());
-            Ok((id, ValueOrView::from(view.map_err(one_line)?)))
+            Ok((id, ValueOrView::from(view.map_err(to_one_line)?)))
         });
         let given = given.collect::<Result<Vec<_>, String>>()?;
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
-        let results = self.model.run(given, self.model.output_ids(), Some(options)).map_err(one_line)?;
+        let results = self.model.run(given, self.model.output_ids(), Some(options)).map_err(to_one_line)?;
         outputs.resize_with(results.len(), Tensor::default);
         for (output, result) in outputs.iter_mut().zip(results) {
             let Value::FloatTensor(result) = result else { return Err("an output is not of floats".to_owned()) };

@@ -36,7 +36,7 @@ impl Scaling {
 
 /// A recognised network.
 #[derive(Debug)]
-pub struct Known {
+pub struct KnownNetwork {
     /// Its file name when installed, which also serves as its name.
     pub file: &'static str,
     /// Its task.
@@ -56,8 +56,8 @@ pub struct Known {
 }
 
 /// The best network of each task first; among equals, the fastest.
-pub static KNOWN: [Known; 7] = [
-    Known {
+pub static KNOWN_NETWORKS: [KnownNetwork; 7] = [
+    KnownNetwork {
         file: "selfie-landscape.tflite",
         task: Task::Matte,
         sha256: "4aafe6223bb8dac6fac8ca8ed56852870a33051ef3f6238822d282a109962894",
@@ -67,7 +67,7 @@ pub static KNOWN: [Known; 7] = [
         scaling: Scaling::UNIT,
         bgr: false,
     },
-    Known {
+    KnownNetwork {
         file: "selfie-landscape.onnx",
         task: Task::Matte,
         sha256: "b580fea1ee4a608472e07e4c2a21af1771d9022bb444e34b7f83719483cb5026",
@@ -77,7 +77,7 @@ pub static KNOWN: [Known; 7] = [
         scaling: Scaling::UNIT,
         bgr: false,
     },
-    Known {
+    KnownNetwork {
         file: "selfie.onnx",
         task: Task::Matte,
         sha256: "1511ab5564cb0ae179cba9bcad6ad931003ccc71656f11fd270967023678c6a5",
@@ -87,7 +87,7 @@ pub static KNOWN: [Known; 7] = [
         scaling: Scaling::UNIT,
         bgr: false,
     },
-    Known {
+    KnownNetwork {
         file: "selfie-planes.onnx",
         task: Task::Matte,
         sha256: "3241ac4ad8aa35bdaf33946776db29f7c283a413aa0b0dacb9483594b4531aad",
@@ -97,7 +97,7 @@ pub static KNOWN: [Known; 7] = [
         scaling: Scaling::UNIT,
         bgr: false,
     },
-    Known {
+    KnownNetwork {
         file: "selfie-int8.onnx",
         task: Task::Matte,
         sha256: "9bc3d56b0b1397acbdafb631ab5c7bf14a889c00fbe2018e36503c65a2b65983",
@@ -107,7 +107,7 @@ pub static KNOWN: [Known; 7] = [
         scaling: Scaling::UNIT,
         bgr: false,
     },
-    Known {
+    KnownNetwork {
         file: "sinet.onnx",
         task: Task::Matte,
         sha256: "17a75acc69747e443717dfaef152ee3c4615f2d81b0269f7c0224c47584af46a",
@@ -121,7 +121,7 @@ pub static KNOWN: [Known; 7] = [
         },
         bgr: true,
     },
-    Known {
+    KnownNetwork {
         file: "tcmonodepth-small.onnx",
         task: Task::Mono,
         sha256: "902b886beaebd3f68deb40bab2fd636a0c112c1ef1cbdd15fa26e5c55b389b4d",
@@ -133,29 +133,29 @@ pub static KNOWN: [Known; 7] = [
     },
 ];
 
-impl Known {
+impl KnownNetwork {
     /// Returns the known network with this content.
-    pub fn of(bytes: &[u8]) -> Option<&'static Self> {
-        if !Self::any_has_size(bytes.len() as u64) {
+    pub fn identify(bytes: &[u8]) -> Option<&'static Self> {
+        if !Self::is_known_size(bytes.len() as u64) {
             return None;
         }
-        let digest = hex(&Sha256::digest(bytes));
-        KNOWN.iter().find(|known| known.sha256 == digest)
+        let digest = to_hex(&Sha256::digest(bytes));
+        KNOWN_NETWORKS.iter().find(|known| known.sha256 == digest)
     }
 
     /// Returns whether a known network has this size: files of other sizes need not be read.
-    pub(super) fn any_has_size(bytes: u64) -> bool {
-        KNOWN.iter().any(|known| known.bytes == bytes)
+    pub(super) fn is_known_size(bytes: u64) -> bool {
+        KNOWN_NETWORKS.iter().any(|known| known.bytes == bytes)
     }
 
     /// Returns the first known network of this name, with or without file extension.
-    pub fn named(name: &str) -> Option<&'static Self> {
-        KNOWN
+    pub fn find_by_name(name: &str) -> Option<&'static Self> {
+        KNOWN_NETWORKS
             .iter()
             .find(|known| known.file == name || known.file.split_once('.').is_some_and(|(stem, _)| stem == name))
     }
 }
 
-fn hex(bytes: &[u8]) -> String {
+fn to_hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

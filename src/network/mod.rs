@@ -3,23 +3,23 @@
 //! The fastest person segmentation, which comes with the packages, is a TFLite file, run by our own code (`tflite`).
 //! ONNX files are run by ONNX Runtime if installed, or else by a library. Files are not trusted: their size and that of
 //! all inputs and outputs is limited, loops are rejected, and failures become one-line errors. No runtime limits memory
-//! and time of a network, so a program may run unknown networks in a separate process ([`apart`]).
+//! and time of a network, so a program may run unknown networks in a separate process ([`isolation`]).
 
-pub mod apart;
 mod built_in;
+mod installed;
+pub mod isolation;
 mod known;
 mod onnx;
 mod onnx_runtime;
-mod place;
 mod tflite;
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-pub use known::{KNOWN, Known, Scaling, Task};
-pub use onnx_runtime::installed as onnx_runtime_installed;
-pub use place::{best, best_in, folders, installed};
+pub use installed::{find_best, find_best_in, installed_networks, model_folders};
+pub use known::{KNOWN_NETWORKS, KnownNetwork, Scaling, Task};
+pub use onnx_runtime::installed_version as onnx_runtime_version;
 
 use crate::compute::catch_panic;
 use crate::files::input;
@@ -131,11 +131,11 @@ pub enum NetworkError {
 }
 
 /// A loaded network, and what is known about its file.
-pub struct Loaded {
+pub struct LoadedNetwork {
     /// The network, ready to run.
     pub network: Network,
     /// The known network with this content, if any.
-    pub known: Option<&'static Known>,
+    pub known: Option<&'static KnownNetwork>,
 }
 
 /// Loads the network in the file `path`.
@@ -143,20 +143,20 @@ pub struct Loaded {
 /// # Errors
 /// The file is unreadable, not a network, has loops or operators that the runtime does not support, or the requested
 /// runtime is not available.
-pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
+pub fn load(path: &Path, runtime: Runtime) -> Result<LoadedNetwork, NetworkError> {
     let bytes = input::read(path, MAX_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
-    let known = Known::of(&bytes);
+    let known = KnownNetwork::identify(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
     if !tflite::is_tflite(&bytes) {
         onnx::reject_loops(&bytes).map_err(refused)?;
     }
-    let loaded = match apart::is_enabled() && known.is_none() {
-        true => apart::load(&bytes, runtime),
+    let loaded = match isolation::is_enabled() && known.is_none() {
+        true => isolation::load(&bytes, runtime),
         false => load_in_process(bytes, runtime),
     };
     let network = loaded.map_err(|failure| match failure {
-        Failure::NoRuntime(why) => NetworkError::NoRuntime(why),
-        Failure::Refused(why) => refused(why),
+        LoadFailure::NoRuntime(why) => NetworkError::NoRuntime(why),
+        LoadFailure::Refused(why) => refused(why),
     })?;
     for port in network.inputs.iter().chain(&network.outputs) {
         if port
@@ -168,12 +168,12 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
             return Err(refused(format!("{} has more than {MAX_VALUES} values: {:?}", port.name, port.shape)));
         }
     }
-    Ok(Loaded { network, known })
+    Ok(LoadedNetwork { network, known })
 }
 
 /// An error of a runtime in loading a network.
 #[derive(Debug, Serialize, Deserialize)]
-enum Failure {
+enum LoadFailure {
     /// The runtime is not available.
     NoRuntime(String),
     /// The network is rejected.
@@ -181,25 +181,25 @@ enum Failure {
 }
 
 /// Loads a network in this process.
-fn load_in_process(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, Failure> {
+fn load_in_process(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, LoadFailure> {
     if tflite::is_tflite(&bytes) {
         return match runtime {
-            Runtime::OnnxRuntime => {
-                Err(Failure::Refused("a .tflite runs on the built-in runtime: leave --network-runtime out".to_owned()))
-            }
-            _ => run_guarded(|| tflite::Tflite::load(&bytes)).map_err(Failure::Refused),
+            Runtime::OnnxRuntime => Err(LoadFailure::Refused(
+                "a .tflite runs on the built-in runtime: leave --network-runtime out".to_owned(),
+            )),
+            _ => run_guarded(|| tflite::Tflite::load(&bytes)).map_err(LoadFailure::Refused),
         };
     }
     let other = match runtime {
         Runtime::BuiltIn => None,
         Runtime::Auto => onnx_runtime::environment().ok(),
-        Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(Failure::NoRuntime)?),
+        Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(LoadFailure::NoRuntime)?),
     };
     run_guarded(|| match other {
         Some(environment) => onnx_runtime::OnnxRuntime::load(&environment, &bytes),
         None => built_in::BuiltIn::load(bytes),
     })
-    .map_err(Failure::Refused)
+    .map_err(LoadFailure::Refused)
 }
 
 /// Calls a runtime; turns panics into errors.
@@ -208,7 +208,7 @@ fn run_guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String>
 }
 
 /// Returns a runtime's message as one line of at most 300 characters.
-fn one_line(error: impl ToString) -> String {
+fn to_one_line(error: impl ToString) -> String {
     let text = error.to_string();
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(300) {

@@ -18,7 +18,7 @@ const MAX_DEPTH: usize = 8;
 
 /// Messages that may contain nodes, with the fields that lead to them (onnx.proto).
 #[derive(Clone, Copy)]
-enum Part {
+enum MessageType {
     Model,
     Function,
     Graph,
@@ -26,13 +26,13 @@ enum Part {
     Attribute,
 }
 
-impl Part {
-    fn field(self, number: u64) -> Option<Part> {
+impl MessageType {
+    fn child(self, number: u64) -> Option<MessageType> {
         match (self, number) {
-            (Part::Model, 7) | (Part::Attribute, 6 | 11) => Some(Part::Graph),
-            (Part::Model, 25) => Some(Part::Function),
-            (Part::Function, 7) | (Part::Graph, 1) => Some(Part::Node),
-            (Part::Node, 5) => Some(Part::Attribute),
+            (MessageType::Model, 7) | (MessageType::Attribute, 6 | 11) => Some(MessageType::Graph),
+            (MessageType::Model, 25) => Some(MessageType::Function),
+            (MessageType::Function, 7) | (MessageType::Graph, 1) => Some(MessageType::Node),
+            (MessageType::Node, 5) => Some(MessageType::Attribute),
             _ => None,
         }
     }
@@ -43,10 +43,10 @@ impl Part {
 /// # Errors
 /// There is such an operator, branches are nested too deeply, or the file is not ONNX.
 pub fn reject_loops(model: &[u8]) -> Result<(), String> {
-    reject_loops_in(Part::Model, model, 0)
+    reject_loops_in(MessageType::Model, model, 0)
 }
 
-fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), String> {
+fn reject_loops_in(message_type: MessageType, message: &[u8], depth: usize) -> Result<(), String> {
     if depth > MAX_DEPTH {
         return Err(format!("it has branches within branches, {MAX_DEPTH} deep or more"));
     }
@@ -54,14 +54,14 @@ fn reject_loops_in(part: Part, message: &[u8], depth: usize) -> Result<(), Strin
     while !rest.is_empty() {
         let (tag, content) = read_field(&mut rest).ok_or_else(not_onnx)?;
         let Some(content) = content else { continue };
-        if let (Part::Node, 4) = (part, tag >> 3)
+        if let (MessageType::Node, 4) = (message_type, tag >> 3)
             && let Some(name) = LOOP_OPERATORS.iter().find(|name| **name == content)
         {
             let name = String::from_utf8_lossy(name);
             return Err(format!("it has the operator {name}, which may run forever; export it without loops"));
         }
-        if let Some(inner) = part.field(tag >> 3) {
-            reject_loops_in(inner, content, depth + usize::from(matches!(part, Part::Attribute)))?;
+        if let Some(inner) = message_type.child(tag >> 3) {
+            reject_loops_in(inner, content, depth + usize::from(matches!(message_type, MessageType::Attribute)))?;
         }
     }
     Ok(())
@@ -116,8 +116,8 @@ fn copy_without_output_shapes(message: &[u8], path: &[u64], to: &mut Vec<u8>) ->
                     [] => inner.extend_from_slice(content),
                     _ => copy_without_output_shapes(content, further, &mut inner)?,
                 }
-                put_varint(tag, to);
-                put_varint(inner.len() as u64, to);
+                write_varint(tag, to);
+                write_varint(inner.len() as u64, to);
                 to.extend_from_slice(&inner);
             }
             _ => to.extend_from_slice(&start[..start.len() - rest.len()]),
@@ -148,7 +148,7 @@ fn read_varint(bytes: &mut &[u8]) -> Option<u64> {
     None
 }
 
-fn put_varint(mut value: u64, to: &mut Vec<u8>) {
+fn write_varint(mut value: u64, to: &mut Vec<u8>) {
     while value >= 0x80 {
         to.push(value as u8 | 0x80);
         value >>= 7;
@@ -162,8 +162,8 @@ mod tests {
 
     fn with(number: u64, content: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        put_varint(number << 3 | 2, &mut bytes);
-        put_varint(content.len() as u64, &mut bytes);
+        write_varint(number << 3 | 2, &mut bytes);
+        write_varint(content.len() as u64, &mut bytes);
         bytes.extend_from_slice(content);
         bytes
     }
@@ -192,7 +192,7 @@ mod tests {
             let function = with(25, &with(7, &with(4, name)));
             let models = [with(7, &within), with(7, &branch(&within)), [with(7, &branch(&[])), function].concat()];
             for model in models {
-                assert!(reject_loops(&model).unwrap_err().contains("may run for ever"), "{model:?}");
+                assert!(reject_loops(&model).unwrap_err().contains("may run forever"), "{model:?}");
             }
         }
         // A node's name is not its operator.

@@ -9,7 +9,7 @@ use ort::logging::LogLevel;
 use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
-use super::{Engine, Network, Port, Tensor, one_line, run_guarded};
+use super::{Engine, Network, Port, Tensor, run_guarded, to_one_line};
 use crate::files::trusted;
 
 /// Its library names, for the dynamic loader.
@@ -24,21 +24,21 @@ pub struct OnnxRuntime(Session);
 /// It is not installed, or cannot be used.
 pub fn environment() -> Result<Environment, String> {
     static OPENED: OnceLock<Result<Environment, String>> = OnceLock::new();
-    OPENED.get_or_init(|| run_guarded(open)).clone()
+    OPENED.get_or_init(|| run_guarded(load_library)).clone()
 }
 
-fn open() -> Result<Environment, String> {
+fn load_library() -> Result<Environment, String> {
     let mut why = "not installed (Debian 13: apt install libonnxruntime1.21; anywhere: pip install onnxruntime, and \
                    ORT_DYLIB_PATH naming its capi/libonnxruntime.so.*)"
         .to_owned();
-    for library in candidates()? {
-        let opened = resolve_library(&library).and_then(|place| ort::init_from(&place).map_err(one_line));
+    for library in candidate_libraries()? {
+        let opened = resolve_library(&library).and_then(|place| ort::init_from(&place).map_err(to_one_line));
         // Its own log would go to stderr unfiltered, including names from the network; errors are returned by calls
         // anyway.
         let quiet = |builder: EnvironmentBuilder| {
             let log =
-                |_, _: &str, _: &str, _: &str, message: &str| tracing::debug!("ONNX Runtime: {}", one_line(message));
-            let environment = builder.with_telemetry(false).with_logger(Arc::new(log)).build().map_err(one_line)?;
+                |_, _: &str, _: &str, _: &str, message: &str| tracing::debug!("ONNX Runtime: {}", to_one_line(message));
+            let environment = builder.with_telemetry(false).with_logger(Arc::new(log)).build().map_err(to_one_line)?;
             environment.set_log_level(LogLevel::Error);
             Ok(environment)
         };
@@ -61,7 +61,7 @@ fn resolve_library(library: &Path) -> Result<PathBuf, String> {
 ///
 /// # Errors
 /// The user's choice is a relative path.
-fn candidates() -> Result<Vec<PathBuf>, String> {
+fn candidate_libraries() -> Result<Vec<PathBuf>, String> {
     if let Some(chosen) = env::var_os("ORT_DYLIB_PATH").filter(|chosen| !chosen.is_empty()) {
         let chosen = PathBuf::from(chosen);
         let is_name = chosen.components().count() == 1 && chosen.file_name() == Some(chosen.as_os_str());
@@ -76,16 +76,16 @@ fn candidates() -> Result<Vec<PathBuf>, String> {
     let mut found: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
     // Installed by pip, for the user or in the active virtual environment.
     let roots = [trusted::absolute("VIRTUAL_ENV"), trusted::absolute("HOME").map(|home| home.join(".local"))];
-    for python in roots.into_iter().flatten().flat_map(|root| entries(&root.join("lib"))) {
+    for python in roots.into_iter().flatten().flat_map(|root| list_folder(&root.join("lib"))) {
         let capi = python.join("site-packages/onnxruntime/capi");
-        found.extend(entries(&capi).into_iter().filter(|file| {
+        found.extend(list_folder(&capi).into_iter().filter(|file| {
             file.file_name().is_some_and(|name| name.to_string_lossy().starts_with("libonnxruntime.so"))
         }));
     }
     Ok(found)
 }
 
-fn entries(folder: &Path) -> Vec<PathBuf> {
+fn list_folder(folder: &Path) -> Vec<PathBuf> {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     listed.map(|entry| entry.path()).collect()
 }
@@ -94,11 +94,11 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// Returns why it is not available.
-pub fn installed() -> Result<String, String> {
-    environment().map(|_| name())
+pub fn installed_version() -> Result<String, String> {
+    environment().map(|_| runtime_name())
 }
 
-fn name() -> String {
+fn runtime_name() -> String {
     // "ORT Build Info: git-branch=rel-1.21.0, ...".
     let version = ort::info().split("rel-").nth(1).and_then(|rest| rest.split(',').next());
     version.map_or_else(|| "ONNX Runtime".to_owned(), |version| format!("ONNX Runtime {version}"))
@@ -106,18 +106,18 @@ fn name() -> String {
 
 impl OnnxRuntime {
     pub fn load(environment: &Environment, bytes: &[u8]) -> Result<Network, String> {
-        let builder = Session::builder(environment).map_err(one_line)?;
+        let builder = Session::builder(environment).map_err(to_one_line)?;
         // One thread, without busy waiting; the other cores are for the blur.
-        let builder = builder.with_intra_threads(1).map_err(one_line)?.with_inter_threads(1).map_err(one_line)?;
-        let mut builder = builder.with_intra_op_spinning(false).map_err(one_line)?;
-        let session = builder.commit_from_memory(bytes).map_err(one_line)?;
-        let ports = |outlets: &[ort::value::Outlet]| outlets.iter().map(port).collect::<Result<Vec<_>, _>>();
+        let builder = builder.with_intra_threads(1).map_err(to_one_line)?.with_inter_threads(1).map_err(to_one_line)?;
+        let mut builder = builder.with_intra_op_spinning(false).map_err(to_one_line)?;
+        let session = builder.commit_from_memory(bytes).map_err(to_one_line)?;
+        let ports = |outlets: &[ort::value::Outlet]| outlets.iter().map(read_port).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(session.inputs())?, ports(session.outputs())?);
-        Ok(Network { engine: Box::new(Self(session)), inputs, outputs, runtime: name() })
+        Ok(Network { engine: Box::new(Self(session)), inputs, outputs, runtime: runtime_name() })
     }
 }
 
-fn port(outlet: &ort::value::Outlet) -> Result<Port, String> {
+fn read_port(outlet: &ort::value::Outlet) -> Result<Port, String> {
     let ValueType::Tensor { shape, .. } = outlet.dtype() else {
         return Err(format!("{} is not a tensor", outlet.name()));
     };
@@ -129,13 +129,13 @@ impl Engine for OnnxRuntime {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
         let given = inputs.iter().map(|tensor| {
             let view = TensorRef::from_array_view((tensor.shape.as_slice(), tensor.values.as_slice()));
-            view.map(SessionInputValue::from).map_err(one_line)
+            view.map(SessionInputValue::from).map_err(to_one_line)
         });
         let given = given.collect::<Result<Vec<_>, String>>()?;
-        let results = self.0.run(given.as_slice()).map_err(one_line)?;
+        let results = self.0.run(given.as_slice()).map_err(to_one_line)?;
         outputs.resize_with(results.len(), Tensor::default);
         for (k, output) in outputs.iter_mut().enumerate() {
-            let (shape, values) = results[k].try_extract_tensor::<f32>().map_err(one_line)?;
+            let (shape, values) = results[k].try_extract_tensor::<f32>().map_err(to_one_line)?;
             output.set(shape.iter().map(|&side| side as usize), values.iter().copied());
         }
         Ok(())

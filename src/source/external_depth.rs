@@ -5,7 +5,7 @@ use super::{DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError,
 use crate::capture::FrameData;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
-use crate::depth::beside::Beside;
+use crate::depth::looped_recording::LoopedRecording;
 use crate::recording::Recording;
 
 /// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged.
@@ -41,7 +41,7 @@ pub(super) fn add_external_depth(
             let depth_from = recorded_depth_origin(&recording);
             request.check_relative_depth(depth_from)?;
             first_depth = request.read_first_depth(&recording);
-            (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
+            (Box::new(LoopedRecording::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
         DepthChoice::SingleCamera(chosen) => return single_camera::add_depth(source, chosen, name, request),

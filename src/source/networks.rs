@@ -1,7 +1,7 @@
 //! Depth from a single camera by networks, either named by the user or installed.
 
 use super::{DepthOrigin, OpenRequest, Options, SingleCameraDepth, Source, SourceError};
-use crate::depth::focus::{FocusRule, PersonFocus, Persons};
+use crate::depth::focus::{FocusRule, PersonDistance, PersonFocus};
 use crate::depth::plate::Companion;
 use crate::depth::{DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Stamp};
@@ -33,15 +33,15 @@ pub fn reject_metric_look(look: &Look, who: &str) -> Result<(), SourceError> {
 #[cfg(feature = "networks")]
 pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -> Result<Opened, SourceError> {
     use crate::depth::single_camera::{Hints, SingleCamera};
-    use crate::network::{Task, best};
+    use crate::network::{Task, find_best};
     let file = |chosen: &Option<NetworkFile>, task: Task| {
         match chosen {
         None => Ok(None),
         Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
-        Some(NetworkFile::Installed) => best(task).map(Some).ok_or_else(|| {
+        Some(NetworkFile::Installed) => find_best(task).map(Some).ok_or_else(|| {
             SourceError::NotFound(format!(
                 "--depth {task}: no network for it is installed: `bokehcam models get {known}`, or name a file: --depth {task}:FILE",
-                known = crate::network::KNOWN.iter().find(|known| known.task == task).map_or("", |known| known.file),
+                known = crate::network::KNOWN_NETWORKS.iter().find(|known| known.task == task).map_or("", |known| known.file),
                 task = task.name()
             ))
         }),
@@ -63,7 +63,7 @@ pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -
 #[cfg(feature = "networks")]
 pub fn installed_networks() -> SingleCameraDepth {
     use crate::network::{self, Task};
-    let installed = network::installed();
+    let installed = network::installed_networks();
     let best =
         |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
     SingleCameraDepth { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
@@ -103,16 +103,16 @@ pub(super) fn add_network_depth(source: Source, request: &OpenRequest) -> Source
 
 /// Opens the network that detects the person in focus, with a short description; `None` if none is installed.
 #[cfg(feature = "networks")]
-fn open_person_detector(request: &OpenRequest) -> Option<(Persons, String)> {
-    let finder = SingleCameraDepth { mono: None, ..installed_networks() };
-    finder.matte.as_ref()?;
-    let opened = open_networks(&finder, request);
+fn open_person_detector(request: &OpenRequest) -> Option<(PersonDistance, String)> {
+    let detector = SingleCameraDepth { mono: None, ..installed_networks() };
+    detector.matte.as_ref()?;
+    let opened = open_networks(&detector, request);
     let logged = opened.inspect_err(|error| tracing::warn!("{error}; the focus uses distances only"));
-    logged.ok().map(|(finder, about)| (Persons::new(finder), about))
+    logged.ok().map(|(detector, about)| (PersonDistance::new(detector), about))
 }
 
 #[cfg(not(feature = "networks"))]
-fn open_person_detector(_: &OpenRequest) -> Option<(Persons, String)> {
+fn open_person_detector(_: &OpenRequest) -> Option<(PersonDistance, String)> {
     None
 }
 
@@ -136,7 +136,7 @@ pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
     if is_used && let Some((mut persons, _)) = open_person_detector(&OpenRequest { options, look: Some(look) }) {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
-        persons.set_distance(FrameInput { stamp, color, right: None }, map);
+        persons.set_person_distance(FrameInput { stamp, color, right: None }, map);
     }
 }
 

@@ -20,8 +20,8 @@ use crate::capture::v4l2::V4l2Camera;
 use crate::clock::Clock;
 use crate::compute::thread_pool::core_count;
 use crate::depth::DepthSource;
-use crate::depth::kept::Kept;
-use crate::depth::recorded::Recorded;
+use crate::depth::constant::ConstantDepth;
+use crate::depth::recorded::RecordedDepth;
 use crate::frame::DepthMap;
 #[cfg(feature = "camera")]
 use crate::layout::Content;
@@ -85,7 +85,7 @@ impl Opened {
                 request.check_relative_depth(depth_from)?;
                 let first_depth = request.read_first_depth(&recording);
                 let depth = match recording.has_depth() {
-                    true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
+                    true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
                 };
                 Ok(Self {
@@ -101,7 +101,7 @@ impl Opened {
                 let (color, map, depth_from) = photo::read_photo(path, request.options)?;
                 request.check_relative_depth(depth_from)?;
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
-                let depth = map.map(|map| Box::new(Kept(map)) as Box<dyn DepthSource>);
+                let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
             }
             #[cfg(feature = "camera")]

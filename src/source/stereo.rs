@@ -115,9 +115,9 @@ pub fn open_stereo(
     let matcher = computing.create_matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
         Geometry::Raw(rectifier) => {
-            (StereoDepth::of_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")
+            (StereoDepth::from_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")
         }
-        Geometry::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher, disparities), "rectified"),
+        Geometry::Rectified(rig) => (StereoDepth::from_rectified(&info.name, rig, matcher, disparities), "rectified"),
     };
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
     let note = if metric { "" } else { ", assumed" };
@@ -130,7 +130,7 @@ pub fn open_stereo(
     let (computing, size) = (computing.clone(), info.size);
     Ok(match is_known {
         true => depth,
-        false => depth.widening(move |disparities| computing.create_matcher(disparities, Effort::Full, size)),
+        false => depth.with_wider_matcher(move |disparities| computing.create_matcher(disparities, Effort::Full, size)),
     })
 }
 

@@ -19,7 +19,7 @@ fn parse(source: &str) -> naga::Module {
 #[test]
 fn every_shader_validates_and_is_named_like_its_file() {
     let blur = ALL.map(|shader| (shader, CONSTANTS.map(|(name, _)| name).to_vec()));
-    let constants = stereo::constants((1, 1), 16, 0, false).map(|(name, _)| name);
+    let constants = stereo::matcher_constants((1, 1), 16, 0, false).map(|(name, _)| name);
     let matching = stereo::ALL.map(|shader| (shader, constants.to_vec()));
     let refine = refine::ALL.map(|shader| (shader, refine::constants(false).map(|(name, _)| name).to_vec()));
     let rectify = (stereo::RECTIFY, stereo::rectify_constants(4, 4, 1).map(|(name, _)| name).to_vec());

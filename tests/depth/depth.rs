@@ -1,6 +1,6 @@
 //! Holes in depth maps, and the focus distance.
 
-use bokehcam::depth::fill::Filler;
+use bokehcam::depth::fill::HoleFiller;
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
@@ -43,7 +43,7 @@ fn a_depth_shadow_becomes_wall_and_a_hole_in_the_person_stays_person() {
             }
         }
     }
-    Filler::new().fill(&mut holed);
+    HoleFiller::new().fill(&mut holed);
     assert_eq!(holed, whole);
 }
 
@@ -52,7 +52,7 @@ fn an_empty_frame_around_the_picture_is_continued_into_its_corners() {
     let inside = |x: u32, y: u32| (10..110).contains(&x) && (10..80).contains(&y);
     let whole = portrait(PERSON_M);
     let mut framed = map(120, 90, |x, y| if inside(x, y) { at(&whole, x, y) } else { 0.0 });
-    Filler::new().fill(&mut framed);
+    HoleFiller::new().fill(&mut framed);
     assert!(framed.metres.iter().all(|&z_m| z_m == WALL_M || z_m == PERSON_M));
     assert_eq!((at(&framed, 0, 0), at(&framed, 119, 89)), (WALL_M, WALL_M));
     assert_eq!((at(&framed, 60, 89), at(&framed, 60, 0)), (PERSON_M, WALL_M), "the person goes on below the picture");
@@ -64,14 +64,14 @@ fn one_known_pixel_fills_the_whole_map() {
     for (width, height) in [(1, 1), (17, 13), (64, 1), (1, 64)] {
         let mut single = DepthMap::new(width, height);
         single.metres[(width * height / 2) as usize] = 2.5;
-        Filler::new().fill(&mut single);
+        HoleFiller::new().fill(&mut single);
         assert!(single.metres.iter().all(|&z_m| z_m == 2.5), "{width} x {height}");
     }
 }
 
 #[test]
 fn a_frame_without_depth_keeps_the_last_good_map_of_its_size() {
-    let mut fill = Filler::new();
+    let mut fill = HoleFiller::new();
     let mut first = map(8, 6, |_, _| f32::NAN);
     fill.fill(&mut first);
     assert!(first.metres.iter().all(|&z_m| z_m == 0.0), "nothing known yet: unknown, in its plain spelling");
@@ -164,7 +164,7 @@ fn the_focus_moves_like_a_lens() {
     let settle = |step_ms: u64| {
         let mut focus = Focus::new(FocusRule::Metres(1.0));
         focus.focus_m(&portrait(1.0), 0);
-        focus.follow(FocusRule::Metres(2.0));
+        focus.set_rule(FocusRule::Metres(2.0));
         (1..=240 / step_ms).map(|step| focus.focus_m(&portrait(2.0), step * step_ms * MS)).last().unwrap()
     };
     assert!((settle(10) - settle(40)).abs() < 1e-3);
@@ -189,7 +189,7 @@ fn depths_of_no_scene_are_unknown() {
                 let focus_m = Focus::new(rule).focus_m(&strange, 0);
                 assert!((0.5..100.0).contains(&focus_m), "{value} in every {rare}th: focus {focus_m}");
                 let (mut filled, mut refined) = (strange.clone(), strange.clone());
-                Filler::new().fill_guided(&mut filled, &color);
+                HoleFiller::new().fill_guided(&mut filled, &color);
                 let mut refiner = Refiner::new();
                 refiner.set_focus(focus_m);
                 refiner.refine(&mut refined, &color, 0);

@@ -41,7 +41,7 @@ fn matcher(size: (u32, u32), disparities: u32, effort: Effort, threads: usize) -
 fn matched([left, right]: &[GrayImage; 2], disparities: u32, effort: Effort, threads: usize) -> DisparityMap {
     let mut map = DisparityMap::default();
     matcher(left.size(), disparities, effort, threads)
-        .disparity(Pair { left, color: None, right }, &mut map)
+        .compute_disparity(Pair { left, color: None, right }, &mut map)
         .expect("a pair of one size");
     assert_eq!(map.size(), left.size());
     assert!(map.px.iter().all(|&d| d > 0.0 && d <= Settings::MAX_DISPARITIES as f32), "every pixel has an answer");
@@ -150,7 +150,7 @@ fn what_rests_is_steady_and_what_moves_is_new() {
             if !keep {
                 matcher_ = matcher((width, height), 32, Effort::Full, 1);
             }
-            matcher_.disparity(Pair { left, color: None, right }, &mut map).unwrap();
+            matcher_.compute_disparity(Pair { left, color: None, right }, &mut map).unwrap();
             if let Some(last) = last.replace(map.px.clone()) {
                 sum += last.iter().zip(&map.px).map(|(a, b)| (a - b).abs()).sum::<f32>();
             }
@@ -166,7 +166,7 @@ fn what_rests_is_steady_and_what_moves_is_new() {
     for (seed, near) in [(1, 12), (2, 12), (3, 24)] {
         let [left, right] = pair((width, height), |x, _| if (100..160).contains(&x) { near } else { 6 });
         let _ = seed;
-        matcher.disparity(Pair { left: &left, color: None, right: &right }, &mut map).unwrap();
+        matcher.compute_disparity(Pair { left: &left, color: None, right: &right }, &mut map).unwrap();
     }
     let at = map.px[40 * width as usize + 150];
     assert!((at - 24.0).abs() < 0.5, "{at}");
@@ -177,11 +177,13 @@ fn unequal_and_unexpected_sizes_are_named() {
     let picture = |width, height| GrayImage { width, height, luma: vec![0; (width * height) as usize] };
     let mut matcher = matcher((20, 10), 16, Effort::Full, 1);
     let mut map = DisparityMap::default();
-    let error =
-        matcher.disparity(Pair { left: &picture(20, 10), color: None, right: &picture(19, 10) }, &mut map).unwrap_err();
+    let error = matcher
+        .compute_disparity(Pair { left: &picture(20, 10), color: None, right: &picture(19, 10) }, &mut map)
+        .unwrap_err();
     assert!(matches!(error, MatchError::Sizes { .. }) && error.to_string().contains("19x10"), "{error}");
-    let error =
-        matcher.disparity(Pair { left: &picture(20, 12), color: None, right: &picture(20, 12) }, &mut map).unwrap_err();
+    let error = matcher
+        .compute_disparity(Pair { left: &picture(20, 12), color: None, right: &picture(20, 12) }, &mut map)
+        .unwrap_err();
     assert!(matches!(error, MatchError::Size { .. }) && error.to_string().contains("20x12"), "{error}");
 }
 

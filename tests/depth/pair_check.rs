@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{self, StereoCalibration};
-use bokehcam::depth::stereo::check::{PairCheck, Verdict, check};
+use bokehcam::depth::stereo::check::{PairCheck, Verdict, check_pair};
 use bokehcam::frame::GrayImage;
 
 const SIZE: (u32, u32) = (320, 240);
@@ -47,7 +47,7 @@ fn pair(near_px: f32, down_px: f32) -> [GrayImage; 2] {
 }
 
 fn checked([left, right]: &[GrayImage; 2]) -> PairCheck {
-    check(left, right, 64).unwrap()
+    check_pair(left, right, 64).unwrap()
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn a_rectified_pair_is_one() {
     let found = checked(&pair(20.0, 0.0));
     assert!(found.matches > 60, "{found:?}");
     assert!(found.vertical_px.abs() < 0.05 && found.vertical_spread_px < 0.2, "{found:?}");
-    assert_eq!((found.negative_share, found.verdict()), (0.0, Verdict::Rectified), "{found:?}");
+    assert_eq!((found.negative_fraction, found.verdict()), (0.0, Verdict::Rectified), "{found:?}");
     assert!((found.largest_px - 20.0).abs() < 0.5, "{found:?}");
 }
 
@@ -64,7 +64,7 @@ fn rows_are_measured_to_parts_of_a_pixel() {
     for down_px in [-13.0, -4.5, 1.25, 2.0, 7.75, 20.0] {
         let found = checked(&pair(20.0, down_px));
         assert!(found.matches > 40 && (found.vertical_px - down_px).abs() < 0.12, "{down_px}: {found:?}");
-        let Verdict::RowsOff { px } = found.verdict() else { panic!("{down_px}: {found:?}") };
+        let Verdict::Misaligned { px } = found.verdict() else { panic!("{down_px}: {found:?}") };
         assert!((px - down_px.abs()).abs() < 0.4, "{px} of {down_px}");
         assert!(found.verdict().to_string().contains("rows are off by up to"));
     }
@@ -75,14 +75,14 @@ fn a_turned_picture_is_not_rectified_though_its_middle_is() {
     let left = picture(|x, y| (x, y));
     let right = picture(|x, y| (x + 10.0 + (y - 120.0) * 0.02, y - (x - 160.0) * 0.02));
     let found = checked(&[left, right]);
-    assert!(found.vertical_px.abs() < 0.75 && matches!(found.verdict(), Verdict::RowsOff { .. }), "{found:?}");
+    assert!(found.vertical_px.abs() < 0.75 && matches!(found.verdict(), Verdict::Misaligned { .. }), "{found:?}");
 }
 
 #[test]
 fn exchanged_eyes_are_seen() {
     let [left, right] = pair(20.0, 0.0);
     let found = checked(&[right, left]);
-    assert_eq!((found.negative_share, found.verdict()), (1.0, Verdict::Swapped), "{found:?}");
+    assert_eq!((found.negative_fraction, found.verdict()), (1.0, Verdict::Swapped), "{found:?}");
     assert!(found.verdict().to_string().contains("exchange"));
 }
 
@@ -108,7 +108,7 @@ fn where_nothing_is_nothing_is_said() {
     }
     for (width, height) in [(0, 0), (1, 1), (7, 300), (300, 3), (17, 17), (40, 40)] {
         let small = GrayImage { width, height, luma: vec![7; (width * height) as usize] };
-        assert_eq!(check(&small, &small, 256).unwrap(), PairCheck::default());
+        assert_eq!(check_pair(&small, &small, 256).unwrap(), PairCheck::default());
     }
 }
 
@@ -116,7 +116,7 @@ fn where_nothing_is_nothing_is_said() {
 fn two_sizes_are_refused() {
     let [left, _] = pair(0.0, 0.0);
     let other = GrayImage { width: 160, height: 480, luma: left.luma.clone() };
-    assert!(check(&left, &other, 64).unwrap_err().to_string().contains("same size"));
+    assert!(check_pair(&left, &other, 64).unwrap_err().to_string().contains("same size"));
 }
 
 fn data(path: &str) -> PathBuf {
@@ -166,7 +166,7 @@ fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck
     for ((map, from), into) in rectifier.maps().iter().zip(&pair).zip(&mut into) {
         map.remap_gray(from, into);
     }
-    check(&into[0], &into[1], 160).unwrap()
+    check_pair(&into[0], &into[1], 160).unwrap()
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn rectifying_makes_real_pairs_rectified() {
         for board in boards {
             let found = rectified(&rig, board.each_ref().map(|path| gray(path)));
             assert!(found.matches > 10 && found.vertical_px.abs() < 0.5, "{board:?}: {found:?}");
-            assert!(!matches!(found.verdict(), Verdict::RowsOff { .. } | Verdict::Swapped), "{board:?}: {found:?}");
+            assert!(!matches!(found.verdict(), Verdict::Misaligned { .. } | Verdict::Swapped), "{board:?}: {found:?}");
         }
     }
 }

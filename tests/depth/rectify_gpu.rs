@@ -59,8 +59,8 @@ fn both_eyes_are_the_same_to_the_bit() {
             cpu.rectify_left(&color, &mut left);
             cpu.rectify_right(&gray, &mut right);
             let (mut made_left, mut made_right) = (ColorImage::default(), GrayImage::default());
-            gpu.left(&color, &mut made_left).expect("the device is sound");
-            gpu.right(&gray, &mut made_right).expect("the device is sound");
+            gpu.rectify_left(&color, &mut made_left).expect("the device is sound");
+            gpu.rectify_right(&gray, &mut made_right).expect("the device is sound");
             assert!(made_left == left && made_right == right, "{size:?}, frame {frame}");
         }
     }
@@ -80,7 +80,7 @@ fn a_source_goes_on_when_the_device_is_gone() {
     };
     let on_gpu = matcher(Backend::Gpu);
     let device = on_gpu.device().expect("it runs on a device");
-    let source = |matcher| StereoDepth::of_raw("two eyes", rectifier(size), matcher, 16);
+    let source = |matcher| StereoDepth::from_raw("two eyes", rectifier(size), matcher, 16);
     let mut sources = [source(matcher(Backend::Cpu)), source(on_gpu)];
     for frame in 0..4 {
         if frame == 2 {

@@ -41,27 +41,27 @@ fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
     noise.collect::<Vec<_>>().try_into().expect("two eyes")
 }
 
-/// Checks that both executors find the same disparities in the pairs, one after the other, with islands of up to
-/// `island` pixels dropped; returns the last disparities.
+/// Checks that both executors find the same disparities in the pairs, one after the other, with speckles of up to
+/// `max_speckle` pixels dropped; returns the last disparities.
 fn same(
     device: &Arc<Device>,
     size: (usize, usize),
     disparities: usize,
-    island: u32,
+    max_speckle: u32,
     pairs: &[[Vec<u8>; 2]],
 ) -> Vec<u16> {
     let mut workers = ThreadPool::new("test", 2);
-    let mut cpu = CpuExecutor::new(size, disparities, island, 2);
-    let mut gpu = GpuExecutor::new(device, size, disparities, island).expect("room for a small picture");
+    let mut cpu = CpuExecutor::new(size, disparities, max_speckle, 2);
+    let mut gpu = GpuExecutor::new(device, size, disparities, max_speckle).expect("room for a small picture");
     let mut found = [vec![1; size.0 * size.1], vec![2; size.0 * size.1]];
     // The priors: none, the disparities of the same pair, and those of another right picture, which can be any in the
     // range.
     let other = &pairs[pairs.len() - 1][1];
     let rounds = pairs.iter().flat_map(|[left, right]| [[left, right], [left, right], [left, other], [left, right]]);
     for (number, [left, right]) in rounds.enumerate() {
-        cpu.disparities([left, right], &mut workers, &mut found[0]).expect("the CPU matches");
-        gpu.disparities([left, right], &mut workers, &mut found[1]).expect("the GPU matches");
-        assert_same(&found[0], &found[1], size, &format!("{disparities} disparities, {island}, round {number}"));
+        cpu.compute_disparities([left, right], &mut workers, &mut found[0]).expect("the CPU matches");
+        gpu.compute_disparities([left, right], &mut workers, &mut found[1]).expect("the GPU matches");
+        assert_same(&found[0], &found[1], size, &format!("{disparities} disparities, {max_speckle}, round {number}"));
     }
     found[0].clone()
 }
@@ -82,8 +82,8 @@ fn disparities_agree_whatever_the_size_and_range() {
     for (width, height) in [(17, 13), (1, 1), (1, 9), (2, 3), (4096, 2), (33, 200), (150, 41)] {
         for disparities in [1, 16, 64, 90, 128, 256] {
             let pairs = [pair(width, height, (disparities - 1).min(60)), pair(width, height, 3)];
-            for island in [0, 12] {
-                same(&device, (width, height), disparities, island, &pairs);
+            for max_speckle in [0, 12] {
+                same(&device, (width, height), disparities, max_speckle, &pairs);
             }
         }
     }
@@ -116,8 +116,8 @@ fn disparities_agree_on_extreme_pictures() {
         ],
     ];
     for disparities in [16, 32, 96] {
-        for island in [0, 3] {
-            same(&device, (width, height), disparities, island, &pairs);
+        for max_speckle in [0, 3] {
+            same(&device, (width, height), disparities, max_speckle, &pairs);
         }
     }
 }
@@ -140,7 +140,7 @@ fn maps_agree_at_every_effort() {
                     let color = (number > 0).then_some(&color);
                     for (matcher, map) in matchers.iter_mut().zip(&mut maps) {
                         matcher.set_effort(effort);
-                        matcher.disparity(Pair { left, color, right }, map).expect("a map");
+                        matcher.compute_disparity(Pair { left, color, right }, map).expect("a map");
                     }
                     let same = maps[0].px == maps[1].px;
                     assert!(same, "{width}x{height}, {disparities} disparities, {effort:?}, pair {number}");
@@ -174,7 +174,7 @@ fn the_passes_of_a_pair_take_less_time_than_the_pair() {
     let mut out = vec![0; width * height];
     for _ in 0..5 {
         let started = std::time::Instant::now();
-        gpu.disparities([&left, &right], &mut workers, &mut out).expect("the GPU matches");
+        gpu.compute_disparities([&left, &right], &mut workers, &mut out).expect("the GPU matches");
         let (whole, passes) = (started.elapsed(), gpu.pass_times().iter().collect::<Vec<_>>());
         eprintln!("{}: {whole:?} {passes:?}", gpu.describe());
         assert!(passes.iter().map(|(_, time)| *time).sum::<std::time::Duration>() <= whole);

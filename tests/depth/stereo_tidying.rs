@@ -1,4 +1,4 @@
-//! The GPU's passes that drop islands and fill gaps agree with a plain per-pixel reference, on maps that are hard for
+//! The GPU's passes that drop speckles and fill gaps agree with a plain per-pixel reference, on maps that are hard for
 //! connected-component labelling.
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
@@ -7,13 +7,13 @@ use crate::common;
 use crate::on_gpu::device;
 
 use bokehcam::compute::device::{Device, Readback, Recorder};
-use bokehcam::depth::stereo::fixed::{FILLED, STEP, UNKNOWN};
+use bokehcam::depth::stereo::fixed::{FILLED, MAX_SPECKLE_STEP, UNKNOWN};
+use bokehcam::depth::stereo::gpu::postprocess::{Scratch, create_passes};
 use bokehcam::depth::stereo::gpu::shaders;
-use bokehcam::depth::stereo::gpu::tidying::{Scratch, passes};
 use common::Numbers;
 
 /// Runs the GPU's passes on a map.
-fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
+fn tidied(device: &Device, size: (usize, usize), max_speckle: u32, map: &[u16]) -> Vec<u16> {
     use wgpu::BufferUsages as Usage;
     let buffer = |bytes, usage| device.create_buffer("test", bytes, usage);
     let pixels = map.len();
@@ -29,15 +29,15 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     let scratch = Scratch { labels: &used[0], sizes: &used[1], filled: &used[2] };
     let out = buffer(pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
     let mut back = Readback::new(device, "words back", pixels * 2);
-    let constants = shaders::constants(size, 16, island, false);
+    let constants = shaders::matcher_constants(size, 16, max_speckle, false);
     let mut recorder = Recorder::new(device, None);
-    passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.record(pass));
+    create_passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.record(pass));
     let take = |bytes: &[u8]| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect();
     recorder.submit_and_read(device, &mut back, (&out, out.size()), take).expect("the device is there")
 }
 
 /// The reference: the same result, pixel by pixel.
-fn expected((width, height): (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
+fn expected((width, height): (usize, usize), max_speckle: u32, map: &[u16]) -> Vec<u16> {
     let mut out = map.to_vec();
     let mut seen = vec![false; map.len()];
     for from in 0..map.len() {
@@ -51,13 +51,13 @@ fn expected((width, height): (usize, usize), island: u32, map: &[u16]) -> Vec<u1
             let beside = [(x > 0).then(|| here - 1), (x + 1 < width).then_some(here + 1)];
             let others = [(y > 0).then(|| here - width), (y + 1 < height).then_some(here + width)];
             for next in beside.into_iter().chain(others).flatten() {
-                let touches = map[next] != UNKNOWN && map[next].abs_diff(map[here]) <= STEP;
+                let touches = map[next] != UNKNOWN && map[next].abs_diff(map[here]) <= MAX_SPECKLE_STEP;
                 if touches && !std::mem::replace(&mut seen[next], true) {
                     found.push(next);
                 }
             }
         }
-        if found.len() <= island as usize {
+        if found.len() <= max_speckle as usize {
             found.into_iter().for_each(|pixel| out[pixel] = UNKNOWN);
         }
     }
@@ -110,11 +110,11 @@ type Made = fn(Place, Place) -> u16;
 const MADE: [(&str, Made); 15] = [
     ("nothing", |_, _| UNKNOWN),
     ("one island", |_, _| LOW),
-    ("a slope that hangs together", |(x, y), _| ((x + y) as u16 * STEP) % 16_000),
-    ("a slope that does not", |(x, y), _| ((x + y) as u16 * (STEP + 1)) % 16_000),
+    ("a slope that hangs together", |(x, y), _| ((x + y) as u16 * MAX_SPECKLE_STEP) % 16_000),
+    ("a slope that does not", |(x, y), _| ((x + y) as u16 * (MAX_SPECKLE_STEP + 1)) % 16_000),
     ("a checkerboard", |(x, y), _| [LOW, HIGH][(x + y) % 2]),
     ("a checkerboard with holes", |(x, y), _| [LOW, UNKNOWN][(x + y) % 2]),
-    ("a checkerboard of one island", |(x, y), _| LOW + (x + y) as u16 % 2 * STEP),
+    ("a checkerboard of one island", |(x, y), _| LOW + (x + y) as u16 % 2 * MAX_SPECKLE_STEP),
     ("a comb that is joined above", |(x, y), _| if x % 2 == 0 || y == 0 { LOW } else { UNKNOWN }),
     ("a comb that is joined below", |(x, y), (_, height)| if x % 2 == 0 || y + 1 == height { LOW } else { HIGH }),
     ("a comb that lies", |(x, y), (width, _)| if y % 2 == 0 || x + 1 == width { LOW } else { UNKNOWN }),
@@ -137,13 +137,13 @@ const MADE: [(&str, Made); 15] = [
     }),
 ];
 
-fn assert_tidied(device: &Device, size: Place, island: u32, map: &[u16], what: &str) {
-    let (expected, found) = (expected(size, island, map), tidied(device, size, island, map));
+fn assert_tidied(device: &Device, size: Place, max_speckle: u32, map: &[u16], what: &str) {
+    let (expected, found) = (expected(size, max_speckle, map), tidied(device, size, max_speckle, map));
     let off = (0..map.len()).filter(|&k| expected[k] != found[k]).collect::<Vec<_>>();
     let Some(&first) = off.first() else { return };
     let (x, y) = (first % size.0, first / size.0);
     let [expected, found] = [expected[first], found[first]];
-    panic!("{what}, {size:?}, {island}: {} differ, at first {x},{y}: {expected} and {found}", off.len());
+    panic!("{what}, {size:?}, {max_speckle}: {} differ, at first {x},{y}: {expected} and {found}", off.len());
 }
 
 #[test]
@@ -155,8 +155,8 @@ fn islands_of_any_shape_are_found() {
             .map(|(what, made)| (what, (0..size.0 * size.1).map(|k| made((k % size.0, k / size.0), size)).collect()));
         let two = spiral(size).iter().map(|&d| d.min(HIGH)).collect();
         for (what, map) in made.into_iter().chain([("a spiral", spiral(size)), ("two spirals", two)]) {
-            for island in [0, 1, 16, 25, 10_000, u32::MAX] {
-                assert_tidied(&device, size, island, &map, what);
+            for max_speckle in [0, 1, 16, 25, 10_000, u32::MAX] {
+                assert_tidied(&device, size, max_speckle, &map, what);
             }
         }
     }
@@ -168,7 +168,7 @@ fn islands_of_chance_are_found_every_time() {
     let device = device();
     let mut numbers = Numbers(3);
     for size in [(1, 200), (200, 1), (53, 61), (128, 90), (511, 200)] {
-        // About the percolation threshold, where islands begin to span the picture, and at few and many known pixels.
+        // About the percolation threshold, where speckles begin to span the picture, and at few and many known pixels.
         for known in [0.1, 0.5, 0.593, 0.65, 0.9] {
             // Only equal disparities connect, or some of their neighbours, too.
             for (levels, apart) in [(1.0, 170), (2.0, 170), (90.0, 170), (6.0, 60), (100.0, 20)] {
@@ -176,9 +176,9 @@ fn islands_of_chance_are_found_every_time() {
                     || if numbers.next() < known { (numbers.next() * levels) as u16 * apart } else { UNKNOWN };
                 let map: Vec<u16> = (0..size.0 * size.1).map(|_| one()).collect();
                 let what = format!("{known} known, {levels} levels {apart} apart");
-                for island in [1, 6, 100] {
+                for max_speckle in [1, 6, 100] {
                     for _ in 0..2 {
-                        assert_tidied(&device, size, island, &map, &what);
+                        assert_tidied(&device, size, max_speckle, &map, &what);
                     }
                 }
             }

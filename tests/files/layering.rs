@@ -47,7 +47,7 @@ const DOORS: [(&str, &[&str]); 30] = [
             "control",
             "files",
             "link/event",
-            "network/apart",
+            "network/isolation",
             "pipewire",
             "sink/ffmpeg",
             "sink/pipe",

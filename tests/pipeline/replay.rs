@@ -9,8 +9,8 @@ use bokehcam::capture::demo::{self, Demo};
 use bokehcam::capture::replay::{PlayRange, Replay};
 use bokehcam::capture::synthetic::Format;
 use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData};
-use bokehcam::depth::beside::Beside;
-use bokehcam::depth::recorded::Recorded;
+use bokehcam::depth::looped_recording::LoopedRecording;
+use bokehcam::depth::recorded::RecordedDepth;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
@@ -151,7 +151,7 @@ pub fn seen(stamp: Stamp) -> FrameInput<'static> {
 fn recorded_depth_is_that_of_the_frame() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), true);
-    let mut depth = Recorded::new(open(folder.path()), "test recording").unwrap();
+    let mut depth = RecordedDepth::new(open(folder.path()), "test recording").unwrap();
     let mut map = DepthMap::default();
     depth.read(seen(Stamp { index: 7, time_ns: 0, captured_ns: None }), &mut map).unwrap();
     assert_eq!(map.size(), SIZE);
@@ -159,7 +159,7 @@ fn recorded_depth_is_that_of_the_frame() {
 
     let without = tempfile::tempdir().unwrap();
     record(without.path(), false);
-    let error = Recorded::new(open(without.path()), "test recording").err().unwrap();
+    let error = RecordedDepth::new(open(without.path()), "test recording").err().unwrap();
     assert!(matches!(&error, DepthError::NoDepth { .. }) && error.to_string().contains("test recording"), "{error}");
 }
 
@@ -168,7 +168,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), true);
     let recording = Recording::open(folder.path(), &Options::default()).unwrap();
-    let mut depth = Beside::new(recording, "test recording").unwrap();
+    let mut depth = LoopedRecording::new(recording, "test recording").unwrap();
     let mut map = DepthMap::default();
     // A lap lasts 400 ms; the camera's own frame count does not matter.
     for (time_ms, frame) in [(0, 0), (39, 0), (40, 1), (41, 1), (399, 9), (400, 0), (850, 1), (40_000_120, 3), (0, 0)] {
@@ -179,7 +179,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     let without = tempfile::tempdir().unwrap();
     record(without.path(), false);
     let recording = Recording::open(without.path(), &Options::default()).unwrap();
-    assert!(matches!(Beside::new(recording, "test recording"), Err(DepthError::NoDepth { .. })));
+    assert!(matches!(LoopedRecording::new(recording, "test recording"), Err(DepthError::NoDepth { .. })));
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
     let camera = Replay::new(recording.clone(), "test recording", &PlayRange::default()).unwrap();
     let sink: Box<dyn Sink> = Target::Y4m(file.to_owned()).open(&sink_options()).unwrap();
     let report = run(Run {
-        depth: Some(Box::new(Recorded::new(recording, "test recording").unwrap())),
+        depth: Some(Box::new(RecordedDepth::new(recording, "test recording").unwrap())),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         look: dof(),
         changes: None,

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use bokehcam::capture::replay::{PlayRange, Replay};
 use bokehcam::capture::{Camera, Captured, FrameBuffers, FrameData};
-use bokehcam::depth::beside::Beside;
-use bokehcam::depth::recorded::Recorded;
+use bokehcam::depth::looped_recording::LoopedRecording;
+use bokehcam::depth::recorded::RecordedDepth;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::demand::Demand;
@@ -112,7 +112,8 @@ fn depth_of_another_recording_stays_beside_the_colours() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), true);
     let mut camera = looped(folder.path(), 0.0);
-    let mut depth = Beside::new(Recording::open(folder.path(), &Options::default()).unwrap(), "beside").unwrap();
+    let mut depth =
+        LoopedRecording::new(Recording::open(folder.path(), &Options::default()).unwrap(), "beside").unwrap();
     let (mut color, mut map, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     for place in [None, Some(6), None, Some(2), Some(9), None, None, Some(5)] {
         if let Some(place) = place {
@@ -127,7 +128,7 @@ fn depth_of_another_recording_stays_beside_the_colours() {
 }
 
 /// Recorded depth that counts scene changes.
-struct Told(Recorded, Arc<std::sync::atomic::AtomicUsize>);
+struct Told(RecordedDepth, Arc<std::sync::atomic::AtomicUsize>);
 
 impl DepthSource for Told {
     fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
@@ -145,7 +146,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
     let camera = looped(folder.path(), 0.0);
     let seeker = camera.seeker().unwrap();
     let jumps = Arc::default();
-    let depth = Told(Recorded::new(open(folder.path()), "test").unwrap(), Arc::clone(&jumps));
+    let depth = Told(RecordedDepth::new(open(folder.path()), "test").unwrap(), Arc::clone(&jumps));
     let (stop, demand) = (AtomicBool::new(false), Demand::new());
     let (view, mut views) = link::live::<View>();
     let sink = Target::Null.open(&sink_options()).unwrap();

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use bokehcam::capture::{Camera, Captured, FrameData, SourceInfo};
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link;
@@ -77,7 +77,7 @@ fn dof() -> Look {
 #[test]
 fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
     let green = [0, 177, 64];
-    let frames = stream(&Look { background: Behind::Color(green), ..dof() }, false);
+    let frames = stream(&Look { background: Background::Color(green), ..dof() }, false);
     for (frame, picture) in (0..FRAMES).zip(&frames) {
         let (taken, _) = Walk::taken(frame);
         for (at, (pixel, own)) in picture.rgb.as_chunks::<3>().0.iter().zip(taken.rgb.as_chunks::<3>().0).enumerate() {
@@ -101,7 +101,7 @@ fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
 fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
     let (green, stop) = ([0, 177, 64], AtomicBool::new(false));
     let (sender, mut views) = link::lossless::<View>();
-    let look = Look { background: Behind::Color(green), ..dof() };
+    let look = Look { background: Background::Color(green), ..dof() };
     let made = Run::new(Walk::camera(), None, look, Box::new(Null), &stop).unwrap();
     let seen = std::thread::scope(|scope| {
         let seen = scope.spawn(move || {

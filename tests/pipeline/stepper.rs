@@ -20,7 +20,7 @@ fn every_frame_is_that_of_a_run() {
     let recording = Recording::open(&dir, &Options::default()).unwrap();
     let followed = Look {
         follow: "1.5".parse().unwrap(),
-        background: bokehcam::depth::backdrop::Behind::Color([0, 99, 9]),
+        background: bokehcam::depth::backdrop::Background::Color([0, 99, 9]),
         ..Look::default()
     };
     for look in [Look::default(), followed, Look::with_effect(Effect::TiltShift), Look::with_effect(Effect::None)] {

@@ -66,7 +66,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     let stop = AtomicBool::new(false);
     let matcher = matcher(SIZE);
     let error = run(Run {
-        depth: Some(Box::new(StereoDepth::of_rectified(
+        depth: Some(Box::new(StereoDepth::from_rectified(
             "fake camera",
             StereoRig::default_for_width(SIZE.0),
             matcher,
@@ -77,7 +77,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
         ..simple(Box::new(fake_camera(5)), Box::new(fake_sink(&Received::default())), &stop, Pace::Asap)
     })
     .unwrap_err();
-    assert!(matches!(error.fault, Fault::Depth(DepthError::OneEye { .. })), "{error}");
+    assert!(matches!(error.fault, Fault::Depth(DepthError::MissingRight { .. })), "{error}");
 }
 
 /// Depth that takes long, less at lower effort; it marks the pictures that it rectifies.
@@ -163,7 +163,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
             let (stop, received) = (AtomicBool::new(false), Received::default());
             let matcher = matcher((width, height));
             run(Run {
-                depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
+                depth: Some(Box::new(StereoDepth::from_rectified("two planes", rig, matcher, 16))),
                 bokeh: Some(bokeh::create_blur(&settings, (width, height), None, Some(1)).unwrap()),
                 look: dof_with(FocusRule::Point { x: focus.0, y: focus.1 }, 16.0),
                 ..simple(two_planes(), Box::new(fake_sink(&received)), &stop, Pace::Asap)

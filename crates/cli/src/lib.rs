@@ -61,7 +61,7 @@ fn run_command(args: &[OsString]) -> ExitCode {
     };
     log::start(&cli.global);
     #[cfg(feature = "networks")]
-    bokehcam::network::apart::make_possible();
+    bokehcam::network::isolation::enable();
     environment::warn_of_unknown();
     match commands::run(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,

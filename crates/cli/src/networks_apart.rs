@@ -3,18 +3,18 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use bokehcam::network::apart;
+use bokehcam::network::isolation;
 
 /// Whether the arguments start the worker process.
 pub fn is_worker_call(args: &[OsString]) -> bool {
-    matches!(args, [_, argument] if argument == apart::ARGUMENT)
+    matches!(args, [_, argument] if argument == isolation::ARGUMENT)
 }
 
 /// Runs the network until the parent process stops reading.
 pub fn serve() -> ExitCode {
     // Signals are for the parent process: this one ends with it.
     let ignored = ctrlc::set_handler(|| {}).is_ok();
-    match apart::serve() {
+    match isolation::serve() {
         Ok(()) if ignored => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     }

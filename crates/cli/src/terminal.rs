@@ -40,7 +40,7 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         is_stopping.store(true, Ordering::Relaxed);
         // A hanging network must not delay the end.
         #[cfg(feature = "networks")]
-        bokehcam::network::apart::hurry();
+        bokehcam::network::isolation::shorten_timeouts();
         #[cfg(feature = "gpu")]
         bokehcam::compute::device::begin_shutdown();
         print_to_stderr("stopping after the current frames; press Ctrl-C again to abort");

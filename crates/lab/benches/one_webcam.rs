@@ -15,7 +15,7 @@ use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::{Runtime, Task, best_in};
+use bokehcam::network::{Runtime, Task, find_best_in};
 use bokehcam::recording::{self, Recording, Scratch};
 use clap::Parser;
 use image::imageops::{FilterType, resize};
@@ -163,6 +163,6 @@ fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
 /// Returns the file of the first known network for a task that exists.
 fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
     let folder = data.join("models");
-    best_in(vec![folder.clone()], task)
+    find_best_in(vec![folder.clone()], task)
         .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()).into())
 }

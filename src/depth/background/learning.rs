@@ -7,7 +7,7 @@ use pulp::{Arch, WithSimd};
 use super::{BackgroundMemory, FRAMES_PER_UPDATE};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::bits::Bits;
+use crate::depth::bitmap::Bitmap;
 use crate::frame::{ColorImage, DepthMap};
 
 /// Interval of the rows that one update covers.
@@ -62,7 +62,7 @@ struct UpdateInput<'a> {
     map: &'a DepthMap,
     color: &'a ColorImage,
     surface_step: f32,
-    mixed: &'a Bits,
+    mixed: &'a Bitmap,
     /// Per code and channel, the code at the exposure of the remembered picture.
     codes: &'a [[u8; 256]; 3],
     size: (usize, usize),
@@ -161,7 +161,7 @@ impl UpdateInput<'_> {
         let (top, bottom) = (y.saturating_sub(CLEAR_PX), (y + CLEAR_PX).min(height - 1));
         let mut mixed = 0;
         for y in top..=bottom {
-            mixed |= self.mixed.word_from(first, y);
+            mixed |= self.mixed.word_at(first, y);
         }
         mixed <<= first + CLEAR_PX - begin;
         let mut close = 0;

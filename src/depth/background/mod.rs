@@ -19,7 +19,7 @@ use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
-use super::bits::Bits;
+use super::bitmap::Bitmap;
 use super::matting::{KnownBackground, MIN_STEP_PX, Matting};
 use super::reduced::{MAX_VALUE, Reducer, block_px, reduced_size};
 use cells::Cells;
@@ -75,7 +75,7 @@ pub struct BackgroundMemory {
     /// Per current code and channel, the code at the initial exposure.
     codes: Box<[[u8; 256]; 3]>,
     /// Mixed pixels of the current matte, beside which nothing is learned.
-    mixed: Bits,
+    mixed: Bitmap,
     cells: Cells,
     /// The revealed pixels of each band.
     pixels: Vec<Vec<MixedPixel>>,
@@ -105,7 +105,7 @@ impl Default for BackgroundMemory {
             light: Box::new([[0.0; 256]; 3]),
             own_light: srgb_to_linear_table(),
             codes: Box::new([[0; 256]; 3]),
-            mixed: Bits::default(),
+            mixed: Bitmap::default(),
             cells: Cells::default(),
             pixels: Vec::new(),
         }
@@ -206,7 +206,7 @@ impl BackgroundMemory {
             has_value.resize(now.len(), false);
             hidden.resize(now.len(), false);
             self.changed.resize(now.len(), false);
-            self.aligner.forget();
+            self.aligner.invalidate();
         }
         let middle = |at: usize, count: usize| (at * block_px + block_px / 2).min(count - 1);
         for row in 0..size.1 {
@@ -220,16 +220,16 @@ impl BackgroundMemory {
                 if is_seen && !has_value[at] {
                     // Remembered values are at the initial exposure.
                     (reduced[at], has_value[at]) = (std::array::from_fn(|p| now[at][p] / self.gain[p]), true);
-                    self.aligner.forget();
+                    self.aligner.invalidate();
                 }
             }
         }
         // Exposure changes are estimated as a gain per channel, from the visible background only.
         let mut alignment = Alignment { gain: self.gain, ..Alignment::default() };
-        self.aligner.shift(reduced, size, [0.0; 2]);
-        self.aligner.step(now, hidden, size, &mut alignment);
+        self.aligner.shift_plate(reduced, size, [0.0; 2]);
+        self.aligner.update(now, hidden, size, &mut alignment);
         self.gain = alignment.gain;
-        self.reducer.expose(self.gain, &mut self.light);
+        self.reducer.fill_exposure_tables(self.gain, &mut self.light);
         for (codes, gain) in self.codes.iter_mut().zip(self.gain) {
             codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
         }

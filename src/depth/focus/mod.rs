@@ -2,7 +2,7 @@
 //!
 //! The focus moves like a lens, in dioptres (1/m): it eases towards its target and ignores small changes.
 
-mod loyalty;
+mod hysteresis;
 mod persons;
 mod subject;
 mod track;
@@ -10,10 +10,10 @@ mod track;
 use std::fmt;
 use std::str::FromStr;
 
-use loyalty::Hysteresis;
-pub use persons::{PersonFocus, Persons};
-use subject::Subject;
-use track::Track;
+use hysteresis::Hysteresis;
+pub use persons::{PersonDistance, PersonFocus};
+use subject::SubjectFinder;
+use track::ObjectTrack;
 
 use crate::frame::DepthMap;
 
@@ -84,9 +84,9 @@ const STOP: f32 = 0.005;
 #[derive(Debug)]
 pub struct Focus {
     rule: FocusRule,
-    subject: Subject,
+    subject: SubjectFinder,
     hysteresis: Hysteresis,
-    track: Option<Track>,
+    track: Option<ObjectTrack>,
     window_m: Vec<f32>,
     lens: Option<EasedLens>,
 }
@@ -101,12 +101,12 @@ struct EasedLens {
 impl Focus {
     /// Creates a focus whose first frame sets the distance at once.
     pub fn new(rule: FocusRule) -> Self {
-        let (subject, hysteresis) = (Subject::default(), Hysteresis::default());
+        let (subject, hysteresis) = (SubjectFinder::default(), Hysteresis::default());
         Self { rule, subject, hysteresis, track: None, window_m: Vec::new(), lens: None }
     }
 
     /// Changes the rule: the lens moves from where it is.
-    pub fn follow(&mut self, rule: FocusRule) {
+    pub fn set_rule(&mut self, rule: FocusRule) {
         if self.rule != rule {
             self.rule = rule;
             (self.hysteresis, self.track) = (Hysteresis::default(), None);
@@ -124,27 +124,29 @@ impl Focus {
                 let Self { subject, hysteresis, .. } = self;
                 let nearest = subject.find(map);
                 let found = map.person_m.map(f32::recip).or(nearest);
-                found.map(|found| 1.0 / hysteresis.choose(found, |dioptres| subject.stays(dioptres), time_ns))
+                found.map(|found| {
+                    1.0 / hysteresis.choose_subject(found, |dioptres| subject.find_near(dioptres), time_ns)
+                })
             }
             FocusRule::Track { x, y } => {
-                let track = self.track.get_or_insert_with(|| Track::new([x, y]));
-                track.find(map, time_ns, &mut self.window_m).map(f32::recip)
+                let track = self.track.get_or_insert_with(|| ObjectTrack::new([x, y]));
+                track.locate(map, time_ns, &mut self.window_m).map(f32::recip)
             }
-            FocusRule::Point { x, y } => point_m(map, x, y, &mut self.window_m),
+            FocusRule::Point { x, y } => median_depth_at(map, x, y, &mut self.window_m),
         };
         let Some(target_m) = target_m else {
             return self.lens.map_or(FALLBACK_M, |lens| 1.0 / lens.dioptres);
         };
         let target = 1.0 / target_m;
         let lens = self.lens.get_or_insert(EasedLens { dioptres: target, time_ns, moving: false });
-        lens.ease(target, time_ns);
+        lens.ease_towards(target, time_ns);
         // A fixed distance is returned exactly.
         if lens.dioptres == target { target_m } else { 1.0 / lens.dioptres }
     }
 }
 
 impl EasedLens {
-    fn ease(&mut self, target: f32, time_ns: u64) {
+    fn ease_towards(&mut self, target: f32, time_ns: u64) {
         let elapsed_s = time_ns.saturating_sub(self.time_ns) as f64 / 1e9;
         self.time_ns = time_ns;
         let off = (target - self.dioptres).abs() / target;
@@ -157,7 +159,7 @@ impl EasedLens {
 }
 
 /// Returns the median of the known depths in a small window around a point, which grows until it contains some.
-fn point_m(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f32> {
+fn median_depth_at(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f32> {
     let (width, height) = (map.width as usize, map.height as usize);
     if width == 0 || height == 0 {
         return None;
@@ -202,7 +204,7 @@ mod tests {
     #[test]
     fn the_lens_does_not_hunt_between_two_subjects() {
         let mut focus = Focus::new(FocusRule::Auto);
-        let found = |columns| 1.0 / Subject::default().find(&beside(columns)).unwrap();
+        let found = |columns| 1.0 / SubjectFinder::default().find(&beside(columns)).unwrap();
         assert!(found(16) < 1.1 && found(9) > 2.9, "large enough, and not");
         for frame in 0..300u64 {
             // Alternates between large enough and too small, every few frames.
@@ -234,7 +236,7 @@ mod tests {
     fn another_rule_moves_the_lens_from_where_it_is() {
         let mut focus = Focus::new(FocusRule::Metres(1.5));
         assert_eq!(focus.focus_m(&flat(4.0), 0), 1.5);
-        focus.follow(FocusRule::Metres(3.0));
+        focus.set_rule(FocusRule::Metres(3.0));
         let mut last_m = 1.5;
         for frame in 1..120u64 {
             let focus_m = focus.focus_m(&flat(4.0), frame * FRAME_NS);

@@ -6,78 +6,78 @@ use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
 /// Interval of the person detection in media time; in between, the last mask is used on the new maps.
-const EVERY_NS: u64 = 200_000_000;
+const DETECTION_INTERVAL_NS: u64 = 200_000_000;
 /// Minimum fraction of the mask that makes a person: less is a face on a poster, or an error.
 const MIN_FRACTION: f32 = 0.01;
 /// Minimum mask value of pixels that surely show the person and not the room.
-const SURE: f32 = 0.9;
+const MIN_SURE_ALPHA: f32 = 0.9;
 /// Height of head and shoulders, from the top of each column of the mask, as a fraction of its height: further below,
 /// masks include held objects, and objects in front of the person.
-const HEAD: f32 = 1.0 / 6.0;
+const HEAD_FRACTION: f32 = 1.0 / 6.0;
 /// Depth range of head and shoulders, in dioptres: 25 cm at 1 m.
-const BODY: f32 = 0.25;
+const BODY_DIOPTRES: f32 = 0.25;
 /// Depth beyond the person's by this factor is a mismatch, as on the repetitive texture of a knitted pullover.
-const TOO_FAR: f32 = 1.25;
+const MISMATCH_RATIO: f32 = 1.25;
 /// Minimum fraction of a row within the outline at the person's distance: masks include other objects as well.
-const THEIRS: f32 = 0.4;
+const MIN_PERSON_FRACTION: f32 = 0.4;
 /// Uncertainty of mask outlines, in mask pixels.
 const OUTLINE_PX: usize = 2;
 
 /// Measures the distance of persons in depth maps.
-pub struct Persons {
-    finder: Box<dyn Companion>,
+pub struct PersonDistance {
+    detector: Box<dyn Companion>,
     last_ns: Option<u64>,
     /// Columns and rows of the mask.
     size: (usize, usize),
     /// Mask pixels of heads and shoulders; empty if there is no person.
-    places: Vec<u32>,
-    /// Whether a mask pixel is not sure; dilated by [`Self::mend`].
+    head_pixels: Vec<u32>,
+    /// Whether a mask pixel is not sure; dilated by [`Self::fill_holes`].
     outside: Vec<bool>,
     line: Vec<bool>,
     dioptres: Vec<f32>,
 }
 
-impl Persons {
-    /// Creates it for the persons that `finder` detects.
-    pub fn new(finder: Box<dyn Companion>) -> Self {
-        let (places, outside, line) = (Vec::new(), Vec::new(), Vec::new());
-        Self { finder, last_ns: None, size: (0, 0), places, outside, line, dioptres: Vec::new() }
+impl PersonDistance {
+    /// Creates it for the persons that `detector` detects.
+    pub fn new(detector: Box<dyn Companion>) -> Self {
+        let (head_pixels, outside, line) = (Vec::new(), Vec::new(), Vec::new());
+        Self { detector, last_ns: None, size: (0, 0), head_pixels, outside, line, dioptres: Vec::new() }
     }
 
     /// Sets [`DepthMap::person_m`], the person's distance in the frame `seen`.
-    pub fn set_distance(&mut self, seen: FrameInput, map: &mut DepthMap) {
+    pub fn set_person_distance(&mut self, seen: FrameInput, map: &mut DepthMap) {
         let time_ns = seen.stamp.time_ns;
-        if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= EVERY_NS) {
+        if self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) >= DETECTION_INTERVAL_NS) {
             self.last_ns = Some(time_ns);
-            self.detect(seen);
+            self.detect_persons(seen);
         }
-        map.person_m = self.distance_m(map);
+        map.person_m = self.measure_distance_m(map);
     }
 
-    /// Sets [`DepthMap::person_m`] like [`Self::set_distance`], and repairs stereo mismatches: within the outline in this
-    /// frame, depth that is unknown or far behind the person is set to the person's distance, in rows where enough has
-    /// it.
+    /// Sets [`DepthMap::person_m`] like [`Self::set_person_distance`], and repairs stereo mismatches: within the
+    /// outline in this frame, depth that is unknown or far behind the person is set to the person's distance, in rows
+    /// where enough has it.
     pub fn fill_holes(&mut self, seen: FrameInput, map: &mut DepthMap) {
-        self.detect(seen);
-        map.person_m = self.distance_m(map);
+        self.detect_persons(seen);
+        map.person_m = self.measure_distance_m(map);
         let Some(person_m) = map.person_m else { return };
         let (columns, rows) = self.size;
         dilate(&mut self.outside, &mut self.line, columns, OUTLINE_PX);
         let (width, height) = (map.width as usize, map.height as usize);
         for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate() {
             let outside = &self.outside[y * rows / height * columns..][..columns];
-            let is_theirs = |metres: f32| metres >= person_m / TOO_FAR && metres <= person_m * TOO_FAR;
+            let is_person = |metres: f32| metres >= person_m / MISMATCH_RATIO && metres <= person_m * MISMATCH_RATIO;
             let mut from = 0;
             while from < width {
                 let is_inside = |x: usize| !outside[x * columns / width];
                 // The next run of pixels inside the outline, or outside of it.
                 let run = (from..width).take_while(|&x| is_inside(x) == is_inside(from)).count();
                 let pixels = &mut row[from..from + run];
-                let theirs = pixels.iter().filter(|&&metres| is_theirs(metres)).count();
-                if is_inside(from) && theirs as f32 >= THEIRS * run as f32 {
+                let person_pixels = pixels.iter().filter(|&&metres| is_person(metres)).count();
+                if is_inside(from) && person_pixels as f32 >= MIN_PERSON_FRACTION * run as f32 {
                     let wrong = pixels
                         .iter_mut()
-                        .filter(|metres| !DepthMap::is_known(**metres) || **metres > TOO_FAR * person_m);
+                        .filter(|metres| !DepthMap::is_known(**metres) || **metres > MISMATCH_RATIO * person_m);
                     wrong.for_each(|metres| *metres = person_m);
                 }
                 from += run;
@@ -85,30 +85,30 @@ impl Persons {
         }
     }
 
-    fn detect(&mut self, seen: FrameInput) {
-        self.places.clear();
-        let Some(Mask { width, height, alpha: share }) = self.finder.segment_persons(seen) else { return };
+    fn detect_persons(&mut self, seen: FrameInput) {
+        self.head_pixels.clear();
+        let Some(Mask { width, height, alpha: alphas }) = self.detector.segment_persons(seen) else { return };
         let (columns, rows) = (*width as usize, *height as usize);
         self.size = (columns, rows);
-        let head = (HEAD * rows as f32).ceil() as usize;
+        let head = (HEAD_FRACTION * rows as f32).ceil() as usize;
         for x in 0..columns {
-            let theirs = (0..rows).map(|y| y * columns + x).skip_while(|&at| share[at] < SURE);
-            let theirs = theirs.take(head).filter(|&at| share[at] >= SURE);
-            self.places.extend(theirs.map(|at| at as u32));
+            let person_pixels = (0..rows).map(|y| y * columns + x).skip_while(|&at| alphas[at] < MIN_SURE_ALPHA);
+            let person_pixels = person_pixels.take(head).filter(|&at| alphas[at] >= MIN_SURE_ALPHA);
+            self.head_pixels.extend(person_pixels.map(|at| at as u32));
         }
         self.outside.clear();
-        self.outside.extend(share.iter().map(|&share| share < SURE));
-        if (self.places.len() as f32) < MIN_FRACTION * share.len() as f32 {
-            self.places.clear();
+        self.outside.extend(alphas.iter().map(|&alpha| alpha < MIN_SURE_ALPHA));
+        if (self.head_pixels.len() as f32) < MIN_FRACTION * alphas.len() as f32 {
+            self.head_pixels.clear();
         }
     }
 
-    /// Returns the distance of most head and shoulder pixels, in metres: the densest range of [`BODY`] dioptres. The
-    /// nearest person has the most pixels.
-    fn distance_m(&mut self, map: &DepthMap) -> Option<f32> {
-        let Self { size: (columns, rows), places, dioptres, .. } = self;
+    /// Returns the distance of most head and shoulder pixels, in metres: the densest range of [`BODY_DIOPTRES`]
+    /// dioptres. The nearest person has the most pixels.
+    fn measure_distance_m(&mut self, map: &DepthMap) -> Option<f32> {
+        let Self { size: (columns, rows), head_pixels, dioptres, .. } = self;
         let within = |at: usize, of: usize, size: u32| (2 * at + 1) * size as usize / (2 * of);
-        let metres = places.iter().map(|&at| {
+        let metres = head_pixels.iter().map(|&at| {
             let (x, y) = (at as usize % *columns, at as usize / *columns);
             map.metres[within(y, *rows, map.height) * map.width as usize + within(x, *columns, map.width)]
         });
@@ -118,7 +118,7 @@ impl Persons {
         // A sliding window over the sorted values.
         let (mut from, mut most) = (0, 0..0);
         for to in 1..=dioptres.len() {
-            while dioptres[to - 1] - dioptres[from] > BODY {
+            while dioptres[to - 1] - dioptres[from] > BODY_DIOPTRES {
                 from += 1;
             }
             if to - from > most.len() {
@@ -132,16 +132,16 @@ impl Persons {
 /// A depth source that adds the person's distance to the maps of another one.
 pub struct PersonFocus {
     depth: Box<dyn DepthSource>,
-    persons: Persons,
-    is_wanted: bool,
-    is_matched: bool,
+    persons: PersonDistance,
+    is_enabled: bool,
+    is_stereo: bool,
 }
 
 impl PersonFocus {
-    /// Creates it from the maps of `depth`; if they are from stereo matching (`is_matched`), they are repaired
-    /// ([`Persons::fill_holes`]).
-    pub fn new(depth: Box<dyn DepthSource>, persons: Persons, is_matched: bool) -> Self {
-        Self { depth, persons, is_wanted: true, is_matched }
+    /// Creates it from the maps of `depth`; if they are from stereo matching (`is_stereo`), they are repaired
+    /// ([`PersonDistance::fill_holes`]).
+    pub fn new(depth: Box<dyn DepthSource>, persons: PersonDistance, is_stereo: bool) -> Self {
+        Self { depth, persons, is_enabled: true, is_stereo }
     }
 }
 
@@ -153,10 +153,10 @@ impl DepthSource for PersonFocus {
     fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.depth.read(seen, map)?;
         map.person_m = None;
-        if self.is_matched {
+        if self.is_stereo {
             self.persons.fill_holes(seen, map);
-        } else if self.is_wanted {
-            self.persons.set_distance(seen, map);
+        } else if self.is_enabled {
+            self.persons.set_person_distance(seen, map);
         }
         Ok(())
     }
@@ -178,12 +178,12 @@ impl DepthSource for PersonFocus {
     }
 
     fn set_focus_on_persons(&mut self, on: bool) {
-        self.is_wanted = on;
+        self.is_enabled = on;
     }
 
     fn seek(&mut self, ahead_ns: i64) {
         self.persons.last_ns = None;
-        self.persons.finder.seek(ahead_ns);
+        self.persons.detector.seek(ahead_ns);
         self.depth.seek(ahead_ns);
     }
 
@@ -211,9 +211,9 @@ mod tests {
         fn new(person: bool) -> Self {
             let mut mask = Mask::default();
             mask.resize(24, 12);
-            for (at, share) in mask.alpha.iter_mut().enumerate() {
+            for (at, alphas) in mask.alpha.iter_mut().enumerate() {
                 let (x, y) = (at % 24, at / 24);
-                *share = if person && (x < 8 && y > 1 || x < 9 && y > 7) { 1.0 } else { 0.3 };
+                *alphas = if person && (x < 8 && y > 1 || x < 9 && y > 7) { 1.0 } else { 0.3 };
             }
             Self { looks: 0, mask }
         }
@@ -248,10 +248,10 @@ mod tests {
     }
 
     /// Returns the focus distance after two seconds, with or without a person.
-    fn focus_m(person: bool, is_wanted: bool) -> f32 {
+    fn focus_m(person: bool, is_enabled: bool) -> f32 {
         let mut source =
-            PersonFocus::new(Box::new(Room::new(person)), Persons::new(Box::new(Room::new(person))), false);
-        source.set_focus_on_persons(is_wanted);
+            PersonFocus::new(Box::new(Room::new(person)), PersonDistance::new(Box::new(Room::new(person))), false);
+        source.set_focus_on_persons(is_enabled);
         let (mut map, mut focus, color) =
             (DepthMap::default(), Focus::new(FocusRule::Auto), ColorImage::new(SIZE.0, SIZE.1));
         let focused = (0..60).map(|index| {
@@ -294,12 +294,12 @@ mod tests {
         let (color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::default());
         let seen = FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color: &color, right: None };
         let mut source =
-            PersonFocus::new(Box::new(Holes(Room::new(true))), Persons::new(Box::new(Room::new(true))), true);
+            PersonFocus::new(Box::new(Holes(Room::new(true))), PersonDistance::new(Box::new(Room::new(true))), true);
         source.read(seen, &mut map).unwrap();
         let at = |x: u32, y: u32| map.metres[(y * SIZE.0 + x) as usize];
         assert!((at(10, 25) - 1.6).abs() < 0.05 && (at(15, 25) - 1.6).abs() < 0.05, "{} {}", at(10, 25), at(15, 25));
         assert_eq!([at(4, 33), at(75, 25), at(90, 5), at(34, 5)], [0.4, 0.0, 4.0, 4.0]);
-        source.persons = Persons::new(Box::new(Room::new(false)));
+        source.persons = PersonDistance::new(Box::new(Room::new(false)));
         source.read(seen, &mut map).unwrap();
         assert_eq!(
             [map.metres[(25 * SIZE.0 + 10) as usize], map.metres[(25 * SIZE.0 + 15) as usize]],

@@ -3,34 +3,34 @@
 use crate::frame::DepthMap;
 
 /// Cells of the disparity histogram, in dioptres, and the upper end of the last cell: 0.2 m.
-const CELLS: usize = 256;
-const NEAREST: f32 = 5.0;
+const BINS: usize = 256;
+const MAX_DIOPTRES: f32 = 5.0;
 /// Half-width of a subject in cells: a head is about 0.25 m deep at 1 m.
 const RADIUS: usize = 6;
 /// Minimum fraction of the known pixels' weight that makes a subject large, and lower bound of the known weight as a
 /// fraction of all: holes must not make small things large.
-const LARGE: f32 = 0.10;
-const MIN_KNOWN: f32 = 0.5;
+const MIN_SUBJECT_FRACTION: f32 = 0.10;
+const MIN_KNOWN_FRACTION: f32 = 0.5;
 /// Off-centre subjects are skipped: from this offset on, in half widths, if another subject behind is larger by the
-/// factor `LARGER` and closer to the centre by `MORE_CENTRAL`; for example leaves beside a person.
-const BESIDE: f32 = 0.3;
-const LARGER: f32 = 1.6;
-const MORE_CENTRAL: f32 = 0.6;
+/// factor `MIN_SIZE_RATIO` and closer to the centre by `MAX_OFFSET_RATIO`; for example leaves beside a person.
+const MIN_OFF_CENTER: f32 = 0.3;
+const MIN_SIZE_RATIO: f32 = 1.6;
+const MAX_OFFSET_RATIO: f32 = 0.6;
 /// Maximum number of sampled rows and columns.
 const MAX_SAMPLES: usize = 160;
 
 /// Finds the nearest large subject in a histogram over disparity, weighted towards the picture's centre.
 #[derive(Debug)]
-pub struct Subject {
-    cells: [Cell; CELLS],
-    /// Total weight for comparison with [`LARGE`].
+pub struct SubjectFinder {
+    bins: [Bin; BINS],
+    /// Total weight for comparison with [`MIN_SUBJECT_FRACTION`].
     total: f32,
     columns: Vec<f32>,
 }
 
 /// Weighted sums over pixels.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cell {
+struct Bin {
     weight: f32,
     /// Sum of weight x disparity, for a resolution finer than the cells.
     disparity: f32,
@@ -38,7 +38,7 @@ struct Cell {
     column: f32,
 }
 
-impl Cell {
+impl Bin {
     fn add(&mut self, other: &Self) {
         self.weight += other.weight;
         self.disparity += other.disparity;
@@ -50,18 +50,18 @@ impl Cell {
     }
 
     /// Returns the absolute mean offset from the centre, in half widths.
-    fn off_middle(&self) -> f32 {
+    fn mean_center_offset(&self) -> f32 {
         (self.column / self.weight).abs()
     }
 }
 
-impl Default for Subject {
+impl Default for SubjectFinder {
     fn default() -> Self {
-        Self { cells: [Cell::default(); CELLS], total: 0.0, columns: Vec::new() }
+        Self { bins: [Bin::default(); BINS], total: 0.0, columns: Vec::new() }
     }
 }
 
-impl Subject {
+impl SubjectFinder {
     /// Returns the subject's distance in dioptres: the nearest large one's, or else the largest one's; `None` if no
     /// depth is known.
     pub fn find(&mut self, map: &DepthMap) -> Option<f32> {
@@ -69,55 +69,57 @@ impl Subject {
         if self.total == 0.0 {
             return None;
         }
-        let bodies = self.bodies();
-        let is_peak = |cell: &usize| is_peak(&bodies, *cell);
-        let is_large = |&cell: &usize| bodies[cell].weight >= LARGE * self.total;
+        let window_sums = self.window_sums();
+        let is_peak = |bin: &usize| is_peak(&window_sums, *bin);
+        let is_large = |&bin: &usize| window_sums[bin].weight >= MIN_SUBJECT_FRACTION * self.total;
         let large = |below: usize| (0..below).rev().filter(is_peak).filter(is_large);
         // The farthest large peak is the background, which does not count as the larger subject.
-        let background = (0..CELLS).filter(is_peak).find(is_large);
-        let is_beside = |&cell: &usize| {
-            let own = bodies[cell];
-            let outdoes = |other: Cell| {
-                other.weight >= LARGER * own.weight && other.off_middle() <= MORE_CENTRAL * own.off_middle()
+        let background = (0..BINS).filter(is_peak).find(is_large);
+        let is_off_center = |&bin: &usize| {
+            let own = window_sums[bin];
+            let outdoes = |other: Bin| {
+                other.weight >= MIN_SIZE_RATIO * own.weight
+                    && other.mean_center_offset() <= MAX_OFFSET_RATIO * own.mean_center_offset()
             };
-            let is_apart =
-                |other: &usize| other + 2 * RADIUS < cell && background.is_some_and(|far| far + 2 * RADIUS < *other);
-            own.off_middle() >= BESIDE && large(cell).filter(is_apart).any(|other| outdoes(bodies[other]))
+            let is_between =
+                |other: &usize| other + 2 * RADIUS < bin && background.is_some_and(|far| far + 2 * RADIUS < *other);
+            own.mean_center_offset() >= MIN_OFF_CENTER
+                && large(bin).filter(is_between).any(|other| outdoes(window_sums[other]))
         };
-        let nearest = large(CELLS).find(|cell| !is_beside(cell));
-        let largest = || (0..CELLS).max_by(|&a, &b| bodies[a].weight.total_cmp(&bodies[b].weight));
-        nearest.or_else(largest).map(|cell| bodies[cell].dioptres())
+        let nearest = large(BINS).find(|bin| !is_off_center(bin));
+        let largest = || (0..BINS).max_by(|&a, &b| window_sums[a].weight.total_cmp(&window_sums[b].weight));
+        nearest.or_else(largest).map(|bin| window_sums[bin].dioptres())
     }
 
-    fn bodies(&self) -> [Cell; CELLS] {
-        std::array::from_fn(|cell| self.body(cell))
+    fn window_sums(&self) -> [Bin; BINS] {
+        std::array::from_fn(|bin| self.window_sum(bin))
     }
 
     /// Returns the distance of a remaining subject near `dioptres` in the last map, if at least half a large one is
     /// left.
-    pub fn stays(&self, dioptres: f32) -> Option<f32> {
-        let around = Self::window(Self::cell(dioptres)).map(|cell| self.body(cell));
+    pub fn find_near(&self, dioptres: f32) -> Option<f32> {
+        let around = Self::window(Self::bin_at(dioptres)).map(|bin| self.window_sum(bin));
         let most = around.max_by(|a, b| a.weight.total_cmp(&b.weight))?;
-        (self.total > 0.0 && most.weight >= 0.5 * LARGE * self.total).then(|| most.dioptres())
+        (self.total > 0.0 && most.weight >= 0.5 * MIN_SUBJECT_FRACTION * self.total).then(|| most.dioptres())
     }
 
-    fn body(&self, cell: usize) -> Cell {
-        let mut body = Cell::default();
-        self.cells[Self::window(cell)].iter().for_each(|cell| body.add(cell));
-        body
+    fn window_sum(&self, bin: usize) -> Bin {
+        let mut window_sum = Bin::default();
+        self.bins[Self::window(bin)].iter().for_each(|bin| window_sum.add(bin));
+        window_sum
     }
 
-    fn cell(dioptres: f32) -> usize {
-        ((dioptres * (CELLS as f32 / NEAREST)) as usize).min(CELLS - 1)
+    fn bin_at(dioptres: f32) -> usize {
+        ((dioptres * (BINS as f32 / MAX_DIOPTRES)) as usize).min(BINS - 1)
     }
 
-    fn window(cell: usize) -> std::ops::Range<usize> {
-        cell.saturating_sub(RADIUS)..(cell + RADIUS + 1).min(CELLS)
+    fn window(bin: usize) -> std::ops::Range<usize> {
+        bin.saturating_sub(RADIUS)..(bin + RADIUS + 1).min(BINS)
     }
 
     /// Fills the histogram.
     fn fill_histogram(&mut self, map: &DepthMap) {
-        self.cells.fill(Cell::default());
+        self.bins.fill(Bin::default());
         let (width, height) = (map.width as usize, map.height as usize);
         let (mut known, mut all) = (0.0, 0.0);
         let step = width.div_ceil(MAX_SAMPLES).max(1);
@@ -132,18 +134,18 @@ impl Subject {
                 all += weight;
                 if DepthMap::is_known(metres) {
                     let disparity = 1.0 / metres;
-                    let one = Cell { weight, disparity: weight * disparity, column: weight * column };
-                    self.cells[Self::cell(disparity)].add(&one);
+                    let one = Bin { weight, disparity: weight * disparity, column: weight * column };
+                    self.bins[Self::bin_at(disparity)].add(&one);
                     known += weight;
                 }
             }
         }
-        self.total = if known > 0.0 { known.max(MIN_KNOWN * all) } else { 0.0 };
+        self.total = if known > 0.0 { known.max(MIN_KNOWN_FRACTION * all) } else { 0.0 };
     }
 }
 
-fn is_peak(bodies: &[Cell; CELLS], cell: usize) -> bool {
-    Subject::window(cell).all(|other| bodies[other].weight <= bodies[cell].weight)
+fn is_peak(window_sums: &[Bin; BINS], bin: usize) -> bool {
+    SubjectFinder::window(bin).all(|other| window_sums[other].weight <= window_sums[bin].weight)
 }
 
 /// Returns a pixel's position relative to the centre, from -1 to 1.
@@ -178,7 +180,7 @@ mod tests {
                 // Only far depth is unknown, as where stereo matching fails.
                 let whole = leaves(until, |_| true);
                 let map = leaves(until, |at| whole.metres[at] < 2.0 || at % every == 0);
-                let found_m = 1.0 / Subject::default().find(&map).unwrap();
+                let found_m = 1.0 / SubjectFinder::default().find(&map).unwrap();
                 assert!((found_m - 1.22).abs() < 0.05, "{until} {every}: {found_m}");
             }
         }
@@ -192,7 +194,7 @@ mod tests {
                 *metres = 0.6;
             }
         }
-        let found_m = 1.0 / Subject::default().find(&map).unwrap();
+        let found_m = 1.0 / SubjectFinder::default().find(&map).unwrap();
         assert!((found_m - 0.6).abs() < 0.02, "{found_m}");
     }
 }

@@ -37,7 +37,7 @@ pub struct LiveDepth {
     pairing: Pairing,
     clock: Clock,
     /// Whether the loss of depth was logged, but not its return.
-    stale: bool,
+    is_stale: bool,
 }
 
 impl LiveDepth {
@@ -53,23 +53,23 @@ impl LiveDepth {
                 live.name()
             );
         }
-        Ok(Self { live, units, registration, pairing: Pairing::default(), clock, stale: false })
+        Ok(Self { live, units, registration, pairing: Pairing::default(), clock, is_stale: false })
     }
 
-    /// Decodes the maps that the camera has ready into `pairing`; waits up to `patience` for the first of them.
-    fn take_maps(&mut self, mut patience: Duration) {
+    /// Decodes the maps that the camera has ready into `pairing`; waits up to `timeout` for the first of them.
+    fn receive_maps(&mut self, mut timeout: Duration) {
         for _ in 0..MAX_POLLS {
-            match self.live.next(patience) {
+            match self.live.next(timeout) {
                 Next::Frame { captured_ns } => {
                     let (layout, planes) = (*self.live.layout(), self.live.planes());
                     if let Some(plane) = planes.and_then(|planes| planes.first().copied()) {
-                        let map = self.pairing.oldest();
+                        let map = self.pairing.oldest_mut();
                         if self.units.decode(&layout, plane, map) {
-                            self.pairing.keep(captured_ns);
+                            self.pairing.commit(captured_ns);
                         }
                     }
                     self.live.release_frame();
-                    patience = Duration::ZERO;
+                    timeout = Duration::ZERO;
                 }
                 Next::Lost(_) => {}
                 Next::Waiting => return,
@@ -79,32 +79,32 @@ impl LiveDepth {
 
     /// Logs when no map has arrived for a while, and when maps arrive again: each change once.
     fn log_staleness(&mut self, now_ns: u64, newest_ns: u64) {
-        let stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
-        if stale != self.stale {
-            match stale {
+        let is_stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
+        if is_stale != self.is_stale {
+            match is_stale {
                 true => tracing::warn!("{}: no depth for a second; the last map is kept", self.live.name()),
                 false => tracing::info!("{}: depth again", self.live.name()),
             }
-            self.stale = stale;
+            self.is_stale = is_stale;
         }
     }
 }
 
 impl DepthSource for LiveDepth {
     fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        self.take_maps(Duration::ZERO);
+        self.receive_maps(Duration::ZERO);
         let now_ns = self.clock.now_ns();
         // Colour frames without a capture time get the newest map.
-        let taken_ns = stamp.captured_ns.unwrap_or(now_ns);
+        let captured_ns = stamp.captured_ns.unwrap_or(now_ns);
         let period_ns = self.live.negotiated().interval.period_ns();
-        if self.pairing.is_worth_waiting(taken_ns, period_ns) {
-            self.take_maps(Duration::from_nanos(period_ns) / WAIT_DIVISOR);
+        if self.pairing.is_worth_waiting(captured_ns, period_ns) {
+            self.receive_maps(Duration::from_nanos(period_ns) / WAIT_DIVISOR);
         }
         let Some(newest_ns) = self.pairing.newest_ns() else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
         self.log_staleness(now_ns, newest_ns);
-        let Some(nearest) = self.pairing.nearest(taken_ns) else {
+        let Some(nearest) = self.pairing.nearest(captured_ns) else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
         match &mut self.registration {
@@ -121,6 +121,6 @@ impl DepthSource for LiveDepth {
         self.live.suspend();
         // The scene may be different afterwards, so that an old map would be wrong.
         self.pairing.clear();
-        self.stale = false;
+        self.is_stale = false;
     }
 }

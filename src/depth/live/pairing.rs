@@ -3,7 +3,7 @@
 use crate::frame::DepthMap;
 
 /// Number of kept maps: depth may lead or lag by a frame.
-const KEPT: usize = 3;
+const MAX_MAPS: usize = 3;
 
 /// Number of periods without a map after which the camera counts as stopped, and waiting would only add delay.
 const STOPPED_PERIODS: u64 = 4;
@@ -11,48 +11,48 @@ const STOPPED_PERIODS: u64 = 4;
 /// The newest maps with their capture times.
 #[derive(Debug, Default)]
 pub(super) struct Pairing {
-    maps: [DepthMap; KEPT],
+    maps: [DepthMap; MAX_MAPS],
     /// Capture times; `None` for an unused map.
-    taken_ns: [Option<u64>; KEPT],
+    captured_ns: [Option<u64>; MAX_MAPS],
     /// Index of the oldest map, which the next one overwrites.
     next: usize,
 }
 
 impl Pairing {
-    /// Returns the map to overwrite, which is unused until [`Pairing::keep`] makes it the newest.
-    pub(super) fn oldest(&mut self) -> &mut DepthMap {
-        self.taken_ns[self.next] = None;
+    /// Returns the map to overwrite, which is unused until [`Pairing::commit`] makes it the newest.
+    pub(super) fn oldest_mut(&mut self) -> &mut DepthMap {
+        self.captured_ns[self.next] = None;
         &mut self.maps[self.next]
     }
 
-    /// Makes the overwritten map the newest, captured at `taken_ns`.
-    pub(super) fn keep(&mut self, taken_ns: u64) {
-        self.taken_ns[self.next] = Some(taken_ns);
-        self.next = (self.next + 1) % KEPT;
+    /// Makes the overwritten map the newest, captured at `captured_ns`.
+    pub(super) fn commit(&mut self, captured_ns: u64) {
+        self.captured_ns[self.next] = Some(captured_ns);
+        self.next = (self.next + 1) % MAX_MAPS;
     }
 
     pub(super) fn clear(&mut self) {
-        self.taken_ns = [None; KEPT];
+        self.captured_ns = [None; MAX_MAPS];
     }
 
     /// Returns the capture time of the newest map.
     pub(super) fn newest_ns(&self) -> Option<u64> {
-        self.taken_ns.into_iter().flatten().max()
+        self.captured_ns.into_iter().flatten().max()
     }
 
-    /// Whether a better map for a frame captured at `taken_ns` is due: the newest map is more than half a period older,
-    /// and the camera still runs.
-    pub(super) fn is_worth_waiting(&self, taken_ns: u64, period_ns: u64) -> bool {
+    /// Whether a better map for a frame captured at `captured_ns` is due: the newest map is more than half a period
+    /// older, and the camera still runs.
+    pub(super) fn is_worth_waiting(&self, captured_ns: u64, period_ns: u64) -> bool {
         self.newest_ns().is_some_and(|newest_ns| {
-            let behind_ns = taken_ns.saturating_sub(newest_ns);
-            (period_ns / 2 + 1..STOPPED_PERIODS * period_ns).contains(&behind_ns)
+            let lag_ns = captured_ns.saturating_sub(newest_ns);
+            (period_ns / 2 + 1..STOPPED_PERIODS * period_ns).contains(&lag_ns)
         })
     }
 
     /// Returns the map captured nearest to this time.
-    pub(super) fn nearest(&self, taken_ns: u64) -> Option<&DepthMap> {
-        let kept = self.maps.iter().zip(self.taken_ns).filter_map(|(map, at_ns)| Some((map, at_ns?)));
-        kept.min_by_key(|(_, at_ns)| at_ns.abs_diff(taken_ns)).map(|(map, _)| map)
+    pub(super) fn nearest(&self, captured_ns: u64) -> Option<&DepthMap> {
+        let captured = self.maps.iter().zip(self.captured_ns).filter_map(|(map, at_ns)| Some((map, at_ns?)));
+        captured.min_by_key(|(_, at_ns)| at_ns.abs_diff(captured_ns)).map(|(map, _)| map)
     }
 }
 
@@ -65,10 +65,10 @@ mod tests {
     fn pairing(times_ms: &[u64]) -> Pairing {
         let mut pairing = Pairing::default();
         for &time_ms in times_ms {
-            let map = pairing.oldest();
+            let map = pairing.oldest_mut();
             map.resize(1, 1);
             map.metres[0] = time_ms as f32;
-            pairing.keep(time_ms * MS);
+            pairing.commit(time_ms * MS);
         }
         pairing
     }
@@ -96,10 +96,10 @@ mod tests {
     #[test]
     fn one_that_failed_to_decode_is_not_taken() {
         let mut pairing = pairing(&[10, 20, 30]);
-        pairing.oldest().metres[0] = -1.0;
+        pairing.oldest_mut().metres[0] = -1.0;
         assert_eq!(pairing.nearest(0).map(|map| map.metres[0]), Some(20.0));
-        pairing.oldest().metres[0] = 40.0;
-        pairing.keep(40 * MS);
+        pairing.oldest_mut().metres[0] = 40.0;
+        pairing.commit(40 * MS);
         assert_eq!(pairing.nearest(50 * MS).map(|map| map.metres[0]), Some(40.0));
     }
 

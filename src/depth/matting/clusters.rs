@@ -10,7 +10,7 @@ mod color_models;
 use super::contrast::Contrast;
 use super::linear_light;
 use super::symmetric::{Symmetric, outer_product};
-use crate::depth::bits::Bits;
+use crate::depth::bitmap::Bitmap;
 
 #[cfg(feature = "gpu")]
 pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
@@ -121,7 +121,7 @@ pub(super) struct FrameView<'a> {
     pub metres: &'a [f32],
     pub depth_step: f32,
     /// Pixels beside depth discontinuities, which may be mixed.
-    pub at_edge: &'a Bits,
+    pub at_edge: &'a Bitmap,
     /// 8-bit sRGB, and the linear light of each code.
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],

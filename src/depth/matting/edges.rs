@@ -9,7 +9,7 @@ use super::alpha::Labels;
 use super::{EdgePixel, fast_max, fast_min};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::bits::{Bits, WORD, set_bits};
+use crate::depth::bitmap::{Bitmap, WORD, set_bits};
 use crate::frame::DepthMap;
 
 /// Finds edge pixels; owns the memory for it.
@@ -44,7 +44,7 @@ impl EdgeDetector {
         (arch, workers): (Arch, &mut ThreadPool),
         map: &DepthMap,
         depth_step: f32,
-        (at_edge, edges): (&mut Bits, &mut Vec<EdgePixel>),
+        (at_edge, edges): (&mut Bitmap, &mut Vec<EdgePixel>),
     ) {
         let (width, height) = (map.width as usize, map.height as usize);
         at_edge.resize((width, height));

@@ -33,7 +33,7 @@ use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 pub use known_background::{KnownBackground, light_at};
 
-use super::bits::Bits;
+use super::bitmap::Bitmap;
 use alpha::{Evidence, LANES, Labels, Prior};
 use clusters::{Clusters, FrameView};
 use edges::EdgeDetector;
@@ -58,7 +58,7 @@ pub struct Matting {
     arch: Arch,
     light: Box<[f32; 256]>,
     /// Pixels beside a depth discontinuity to one of the eight neighbours; all others are pure.
-    at_edge: Bits,
+    at_edge: Bitmap,
     edge_detector: EdgeDetector,
     edges: Vec<EdgePixel>,
     /// The pixels at edges, followed by the traced ones.
@@ -142,7 +142,7 @@ impl Default for Matting {
         Self {
             arch: Arch::new(),
             light: srgb_to_linear_table(),
-            at_edge: Bits::default(),
+            at_edge: Bitmap::default(),
             edge_detector: EdgeDetector::default(),
             edges: Vec::new(),
             pixels: Vec::new(),

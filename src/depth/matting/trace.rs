@@ -9,7 +9,7 @@ use super::alpha::Labels;
 use super::clusters::{Clusters, FrameView};
 use super::{EdgePixel, Pixel, neighbourhood};
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::bits::{Bits, set_bits};
+use crate::depth::bitmap::{Bitmap, set_bits};
 use crate::frame::DepthMap;
 
 /// Minimum alpha of a pixel whose neighbours are traced, where the map has no edge.
@@ -26,7 +26,7 @@ pub struct Trace<'a> {
     pub depth_step: f32,
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],
-    pub at_edge: &'a mut Bits,
+    pub at_edge: &'a mut Bitmap,
     pub clusters: &'a mut Clusters,
     /// The pixels from which to trace one step; the new ones are appended to `pixels`.
     pub compared: Range<usize>,
@@ -48,7 +48,7 @@ impl WithSimd for Trace<'_> {
             }
             let (xs, ys) = neighbourhood(&edge, 1, size);
             for y in ys {
-                for place in set_bits(!at_edge.word_from(xs.start, y) & low_bits(xs.len())) {
+                for place in set_bits(!at_edge.word_at(xs.start, y) & low_bits(xs.len())) {
                     let x = xs.start + place;
                     let is_far = (DepthMap::inverse_depth(metres[y * size.0 + x]) - edge.far).abs() <= depth_step;
                     if !is_far {
@@ -88,9 +88,9 @@ pub struct WideRegions {
     /// Ranges of the pixels that were traced in each step.
     pub steps: Vec<Range<usize>>,
     /// Traced pixels, those of them with some alpha, and those in wide regions.
-    traced: Bits,
-    seen: Bits,
-    wide: Bits,
+    traced: Bitmap,
+    seen: Bitmap,
+    wide: Bitmap,
     /// Indices of the pixels of a step whose 3x3 neighbourhood is full.
     middles: Vec<usize>,
 }
@@ -116,7 +116,7 @@ impl WideRegions {
         for step in &*steps {
             let is_middle = |edge: &EdgePixel| {
                 let (xs, ys) = neighbourhood(edge, 1, size);
-                let missing = ys.fold(0, |missing, y| missing | !seen.word_from(xs.start, y));
+                let missing = ys.fold(0, |missing, y| missing | !seen.word_at(xs.start, y));
                 missing & low_bits(xs.len()) == 0
             };
             middles.clear();
@@ -125,9 +125,9 @@ impl WideRegions {
             for &middle in &*middles {
                 let (xs, ys) = neighbourhood(&pixels[middle].edge, 2, size);
                 for y in ys {
-                    let part = traced.word_from(xs.start, y) & low_bits(xs.len());
-                    seen.set_from(xs.start, y, part);
-                    wide.set_from(xs.start, y, part);
+                    let part = traced.word_at(xs.start, y) & low_bits(xs.len());
+                    seen.set_word(xs.start, y, part);
+                    wide.set_word(xs.start, y, part);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::depth::tap::nearest;
+use crate::depth::tap::nearest_index;
 use crate::frame::DepthMap;
 
 use super::Vector;
@@ -54,7 +54,7 @@ impl Pictures<'_> {
                         .for_each(|(near, metres)| *near = [near[0] | if *metres < split_m { 0xff } else { 0 }; 3]);
                 } else {
                     for (near, x) in row.iter_mut().zip(columns.clone()) {
-                        let metres = map.metres[nearest(y * width + x, self.grid.size, map_size)];
+                        let metres = map.metres[nearest_index(y * width + x, self.grid.size, map_size)];
                         *near = [near[0] | if metres < split_m { 0xff } else { 0 }; 3];
                     }
                 }

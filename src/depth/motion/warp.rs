@@ -6,7 +6,7 @@ use pulp::WithSimd;
 
 use super::Vector;
 use super::layers::{Cell, Grid};
-use crate::depth::fill::holes;
+use crate::depth::fill::find_holes;
 use crate::frame::DepthMap;
 
 /// Warps a map.
@@ -90,7 +90,7 @@ impl Warp<'_> {
             let (row, below) = rest.split_at_mut(width);
             let mut filled_until = 0;
             loop {
-                let next = holes(&row[filled_until..]).next();
+                let next = find_holes(&row[filled_until..]).next();
                 let Some(hole) = next else { break };
                 let hole = filled_until + hole.start..filled_until + hole.end;
                 let left_m = hole.start.checked_sub(1).map_or(0.0, |x| row[x]);
@@ -116,8 +116,8 @@ impl Warp<'_> {
     }
 }
 
-/// Copies the depth of a cell's surface, selected by `is_taken`, to its new place, if it is nearer than the depth there.
-/// At the picture's border, the edge pixels are replicated.
+/// Copies the depth of a cell's surface, selected by `is_taken`, to its new place, if it is nearer than the depth
+/// there. At the picture's border, the edge pixels are replicated.
 #[inline(always)]
 fn move_surface(
     from: &DepthMap,

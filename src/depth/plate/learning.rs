@@ -160,7 +160,7 @@ impl BlockBlender<'_> {
         }
         let scale = 1.0 / (lines.len() * columns.len()) as f32;
         let at = row * self.input.color.width.div_ceil(block_px as u32) as usize + column;
-        self.reduced[at] = sums.map(|sum| self.reducer.root(sum * scale));
+        self.reduced[at] = sums.map(|sum| self.reducer.sqrt_light(sum * scale));
         self.changed = true;
     }
 }

@@ -101,10 +101,10 @@ impl Plate {
         }
         let Self { reduced, now, aligner, alignment, subject, .. } = self;
         for _ in 0..if self.has_started { 1 } else { FIRST_ITERATIONS } {
-            aligner.shift(reduced, size, alignment.shift);
-            aligner.step(now, &subject.foreground, size, alignment);
-            aligner.shift(reduced, size, alignment.shift);
-            subject.segment(now, aligner.shifted(), size, alignment);
+            aligner.shift_plate(reduced, size, alignment.shift);
+            aligner.update(now, &subject.foreground, size, alignment);
+            aligner.shift_plate(reduced, size, alignment.shift);
+            subject.segment(now, aligner.shifted_plate(), size, alignment);
         }
         if let Some(persons) = persons {
             subject.keep_persons(persons, size);
@@ -115,11 +115,11 @@ impl Plate {
         if self.is_matching {
             let input = UpdateInput { color, now, subject, alignment, time_ns };
             if self.updater.update_plate(input, &self.reducer, &mut self.color, reduced) {
-                aligner.forget();
+                aligner.invalidate();
             }
         }
         self.draw_mask(size);
-        self.reducer.expose(self.alignment.gain, &mut self.light);
+        self.reducer.fill_exposure_tables(self.alignment.gain, &mut self.light);
         self.is_matching
     }
 

@@ -3,7 +3,7 @@
 use crate::depth::alignment::Alignment;
 use crate::depth::dilation::dilate;
 use crate::depth::reduced::MAX_VALUE;
-use crate::depth::tap::nearest;
+use crate::depth::tap::nearest_index;
 use crate::frame::Mask;
 
 /// Hysteresis thresholds of the difference, for low noise: possible foreground, and certain foreground.
@@ -247,7 +247,7 @@ impl Subject {
         let mut near = std::mem::take(&mut self.near);
         near.clone_from(&self.seen);
         dilate(&mut near, &mut self.flags, of_mask.0, (CLOSE_FRACTION * of_mask.0 as f32).ceil() as usize);
-        let place = |at: u32| nearest(at as usize, size, of_mask);
+        let place = |at: u32| nearest_index(at as usize, size, of_mask);
         let mut kept = 0;
         for component in &mut self.components {
             let range = component.first..component.end;

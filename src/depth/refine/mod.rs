@@ -32,7 +32,7 @@ use self::noise::NoiseEstimator;
 use self::smooth::{Smoother, invert};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
-use super::fill::Filler;
+use super::fill::HoleFiller;
 use crate::compute::thread_pool::ThreadPool;
 #[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
@@ -73,7 +73,7 @@ impl Default for MapCorrection {
 pub struct Refiner {
     arch: Arch,
     upsampler: Upsampler,
-    filler: Filler,
+    filler: HoleFiller,
     /// Pixels whose depth was not measured, but filled in.
     unknown: Vec<bool>,
     /// Focus distance over the depth.
@@ -115,8 +115,8 @@ impl Refiner {
         Self { correction: MapCorrection { coarsest, ..correction }, ..Self::default() }
     }
 
-    /// Moves refinement to `device` if it passes its self-test and maps need no correction. When it fails, the CPU takes
-    /// over with the same frame.
+    /// Moves refinement to `device` if it passes its self-test and maps need no correction. When it fails, the CPU
+    /// takes over with the same frame.
     #[must_use]
     pub fn with_device(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
@@ -161,7 +161,7 @@ impl Refiner {
 
     /// Discards the state of earlier frames, for a new scene.
     pub fn reset(&mut self) {
-        self.filler = Filler::new();
+        self.filler = HoleFiller::new();
         self.temporal.reset();
         self.focus = Focus::default();
         #[cfg(feature = "gpu")]
@@ -222,7 +222,7 @@ impl Refiner {
         time_ns: Option<u64>,
     ) {
         self.upsampler.resize(map, color.size());
-        let is_good = self.filler.fill_once(map, color);
+        let is_good = self.filler.fill_without_storing(map, color);
         // The filler fills all holes or none: the first pixel shows which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.reset();
@@ -238,7 +238,7 @@ impl Refiner {
         let measured_noise = noise_estimator.estimate(|at| focus_m / map.metres[at], |at| unknown[at], size);
         smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
         if is_good {
-            filler.keep_by_swap(map);
+            filler.store_by_swap(map);
         }
         let noise = noise_estimator.estimate(|at| inverse[at], |at| unknown[at], size);
         let depth_step = MIN_DEPTH_STEP.max(DEPTH_STEP_SIGMAS * noise);

@@ -18,13 +18,13 @@ const MAX_HALF_PX: f32 = 4.0;
 const BLOCK: usize = 32;
 
 /// Draws the pixels of `from` into `into`.
-pub(super) struct Draw<'a> {
+pub(super) struct DrawSquares<'a> {
     pub registration: &'a Registration,
     pub from: &'a [f32],
     pub into: &'a mut [f32],
 }
 
-impl WithSimd for Draw<'_> {
+impl WithSimd for DrawSquares<'_> {
     type Output = ();
     // Plain loops over blocks, which the compiler vectorises for the instruction set that `pulp` selects.
     #[inline(always)]

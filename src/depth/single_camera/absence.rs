@@ -3,7 +3,7 @@
 use crate::frame::Mask;
 
 /// Minimum mask value of a person.
-const PERSON: f32 = 0.5;
+const PERSON_ALPHA: f32 = 0.5;
 
 /// Tracks how long no person was seen.
 #[derive(Debug, Default)]
@@ -14,18 +14,18 @@ pub struct Absence {
 
 impl Absence {
     /// Minimum duration of a reported absence: short breaks are normal.
-    pub const LONG_NS: u64 = 5_000_000_000;
+    pub const MIN_REPORTED_NS: u64 = 5_000_000_000;
 
     /// Returns whether a long absence is to be reported, given the current mask of persons: true only once per source,
     /// since the same network in the same place would not do better.
     pub fn should_report(&mut self, mask: &Mask, now_ns: u64) -> bool {
-        if mask.alpha.iter().any(|alpha| *alpha > PERSON) {
+        if mask.alpha.iter().any(|alpha| *alpha > PERSON_ALPHA) {
             self.since_ns = None;
             return false;
         }
         let since_ns = *self.since_ns.get_or_insert(now_ns);
         // Time goes back when a recording restarts.
-        let is_long = now_ns.saturating_sub(since_ns) >= Self::LONG_NS;
+        let is_long = now_ns.saturating_sub(since_ns) >= Self::MIN_REPORTED_NS;
         is_long && !std::mem::replace(&mut self.is_reported, true)
     }
 }
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn a_long_absence_is_told_once() {
-        let mask = |share: f32| Mask { width: 2, height: 1, alpha: vec![0.1, share] };
+        let mask = |alpha: f32| Mask { width: 2, height: 1, alpha: vec![0.1, alpha] };
         let mut absence = Absence::default();
         // A person leaves after four seconds, and returns for a moment after eight.
         let is_there = |second: u64| second < 4 || second == 8;

@@ -5,24 +5,24 @@
 //! belong to it; persons further away do not. With a mask alone, everything else is infinitely far.
 
 mod absence;
-mod aside;
-mod belongings;
-mod decision;
-mod feed;
-mod held;
-mod parts;
+mod background_worker;
+mod components;
+mod held_objects;
+mod mask_postprocess;
 mod person;
-mod relief;
+mod picture_network;
+mod relative_depth;
+mod subject_mask;
 
 use std::path::Path;
 
-pub use feed::Hints;
+pub use picture_network::Hints;
 
 use absence::Absence;
-use feed::Feed;
-use held::Held;
-use person::Person;
-use relief::Relief;
+use person::PersonSegmenter;
+use picture_network::PictureNetwork;
+use relative_depth::RelativeDepth;
+use subject_mask::SubjectMask;
 
 use super::matting::mask::MaskMatting;
 use super::plate::Companion;
@@ -34,31 +34,31 @@ use crate::network::{self, Runtime, Task};
 
 /// Interval in frames of the depth network beside persons, per effort level: a room hardly moves. The person network
 /// runs in every frame, since outlines are valid for one frame only.
-const EVERY: [u64; 3] = [8, 4, 2];
+const DEPTH_INTERVALS: [u64; 3] = [8, 4, 2];
 /// The interval without a person network.
-const EVERY_ALONE: [u64; 3] = [2, 1, 1];
+const DEPTH_INTERVALS_ALONE: [u64; 3] = [2, 1, 1];
 /// Relative cost of each effort level.
-const EFFORTS: [f64; EVERY.len()] = [0.5, 0.8, 1.0];
+const EFFORTS: [f64; DEPTH_INTERVALS.len()] = [0.5, 0.8, 1.0];
 /// Frames further apart in media time are unrelated.
-const APART_NS: u64 = 500_000_000;
+const MAX_GAP_NS: u64 = 500_000_000;
 
 /// Depth from networks that run on a camera's pictures.
 pub struct SingleCamera {
     name: String,
     runtime: String,
-    person: Option<Person>,
+    person: Option<PersonSegmenter>,
     absence: Absence,
-    relief: Option<Relief>,
-    held: Held,
-    spread: Spread,
+    relative_depth: Option<RelativeDepth>,
+    subject_mask: SubjectMask,
+    upsampler: NearnessUpsampler,
     matting: MaskMatting,
-    /// Index into [`EVERY`].
+    /// Index into [`DEPTH_INTERVALS`].
     effort: usize,
     /// Whether frames arrive in real time; if not, the results must not depend on this machine's speed.
     is_live: bool,
     frames: u64,
     last_ns: Option<u64>,
-    turn: Turn,
+    due: DueNetworks,
     /// Whether a person network was loaded.
     has_subject: bool,
 }
@@ -74,7 +74,7 @@ impl SingleCamera {
         hints: &Hints,
         runtime: Runtime,
     ) -> Result<Self, DepthError> {
-        let (mut names, mut run_by) = (Vec::new(), String::new());
+        let (mut names, mut runtime_name) = (Vec::new(), String::new());
         let mut load = |path: &Path, task| {
             let name = path.display().to_string();
             let failed = |why: String| DepthError::Network { name: name.clone(), why };
@@ -83,29 +83,29 @@ impl SingleCamera {
                 return Err(failed(format!("this is {}, a network for --depth {}", known.file, known.task.name())));
             }
             names.push(loaded.known.map_or_else(|| name.clone(), |known| known.file.to_owned()));
-            run_by = loaded.network.runtime.clone();
-            Feed::new(loaded, task, hints).map_err(failed)
+            runtime_name = loaded.network.runtime.clone();
+            PictureNetwork::new(loaded, task, hints).map_err(failed)
         };
-        let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(Person::new);
-        let relief = mono.map(|path| load(path, Task::Mono)).transpose()?.map(Relief::new);
+        let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(PersonSegmenter::new);
+        let relative_depth = mono.map(|path| load(path, Task::Mono)).transpose()?.map(RelativeDepth::new);
         let has_subject = person.is_some();
         let mut networks = Self {
             name: names.join(" and "),
-            runtime: run_by,
+            runtime: runtime_name,
             person,
             absence: Absence::default(),
-            relief,
-            held: Held::default(),
-            spread: Spread::default(),
+            relative_depth,
+            subject_mask: SubjectMask::default(),
+            upsampler: NearnessUpsampler::default(),
             matting: MaskMatting::default(),
-            effort: EVERY.len() - 1,
+            effort: DEPTH_INTERVALS.len() - 1,
             is_live: false,
             frames: 0,
             last_ns: None,
-            turn: Turn::default(),
+            due: DueNetworks::default(),
             has_subject,
         };
-        networks.try_out()?;
+        networks.self_test()?;
         Ok(networks)
     }
 
@@ -115,39 +115,40 @@ impl SingleCamera {
     }
 
     /// Runs the networks on a grey picture, so that errors appear at the start.
-    fn try_out(&mut self) -> Result<(), DepthError> {
-        let Self { name, person, relief, .. } = self;
+    fn self_test(&mut self) -> Result<(), DepthError> {
+        let Self { name, person, relative_depth, .. } = self;
         let failed = |why| DepthError::Network { name: name.clone(), why };
         let mut grey = ColorImage::new(64, 48);
         grey.rgb.fill(128);
         person.as_mut().map_or(Ok(()), |person| person.run(&grey, 0)).map_err(failed)?;
-        relief.as_mut().map_or(Ok(()), |relief| relief.run(&grey, None)).map_err(failed)
+        relative_depth.as_mut().map_or(Ok(()), |relative_depth| relative_depth.run(&grey, None)).map_err(failed)
     }
 
     /// Starts a picture at `time_ns`: decides which networks run. Does nothing if the picture was started already.
-    fn begin_picture(&mut self, time_ns: u64) {
+    fn schedule_networks(&mut self, time_ns: u64) {
         if self.last_ns == Some(time_ns) {
             return;
         }
-        let apart = self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) > APART_NS);
+        let is_new_scene = self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) > MAX_GAP_NS);
         self.last_ns = Some(time_ns);
-        if apart {
-            self.person.iter_mut().for_each(Person::forget);
-            self.held.forget();
+        if is_new_scene {
+            self.person.iter_mut().for_each(PersonSegmenter::reset);
+            self.subject_mask.reset();
         }
         // Without a person network, depth is also the source of the outlines.
-        let every = if self.has_subject { EVERY } else { EVERY_ALONE }[self.effort];
+        let every = if self.has_subject { DEPTH_INTERVALS } else { DEPTH_INTERVALS_ALONE }[self.effort];
         // Run depth in the background in real time, but not after a break, when the last result is of another scene.
-        let in_background = self.is_live && self.has_subject && !apart && core_count() > 1;
-        self.turn = Turn { persons: true, all: apart || self.frames.is_multiple_of(every), in_background };
+        let in_background = self.is_live && self.has_subject && !is_new_scene && core_count() > 1;
+        self.due =
+            DueNetworks { person: true, depth: is_new_scene || self.frames.is_multiple_of(every), in_background };
         self.frames += 1;
     }
 
     /// Runs the person network if it is due; disables it on an error.
     fn run_person_network(&mut self, color: &ColorImage, time_ns: u64) {
         // At most one run per picture.
-        let is_turn = std::mem::take(&mut self.turn.persons);
-        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.run(color, time_ns)) {
+        let is_due = std::mem::take(&mut self.due.person);
+        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_due).map(|person| person.run(color, time_ns)) {
             tracing::error!("{}: the network for persons is turned off, so everything is blurred: {why}", self.name);
             self.person = None;
         }
@@ -155,56 +156,65 @@ impl SingleCamera {
 }
 
 /// Runs the depth network around the subject in `mask` if it is due; disables it on an error.
-fn run_depth(relief: &mut Option<Relief>, (name, turn): (&str, Turn), color: &ColorImage, mask: Option<&Mask>) {
-    let looked = relief.as_mut().map(|relief| match turn {
-        Turn { all: false, .. } => relief.collect(false),
-        Turn { in_background: true, .. } => relief.run_async(color, mask),
-        Turn { in_background: false, .. } => relief.run(color, mask),
+fn run_depth_network(
+    relative_depth: &mut Option<RelativeDepth>,
+    (name, due): (&str, DueNetworks),
+    color: &ColorImage,
+    mask: Option<&Mask>,
+) {
+    let outcome = relative_depth.as_mut().map(|relative_depth| match due {
+        DueNetworks { depth: false, .. } => relative_depth.collect(false),
+        DueNetworks { in_background: true, .. } => relative_depth.run_async(color, mask),
+        DueNetworks { in_background: false, .. } => relative_depth.run(color, mask),
     });
-    if let Some(Err(why)) = looked {
+    if let Some(Err(why)) = outcome {
         tracing::error!("{name}: the network for depth is turned off: {why}");
-        *relief = None;
+        *relative_depth = None;
     }
 }
 
 /// The networks that are due for the current picture.
 #[derive(Clone, Copy, Debug, Default)]
-struct Turn {
-    persons: bool,
-    all: bool,
+struct DueNetworks {
+    person: bool,
+    depth: bool,
     /// Whether the depth result may arrive some frames later.
     in_background: bool,
 }
 
 impl DepthSource for SingleCamera {
     fn read(&mut self, FrameInput { stamp, color, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
-        self.begin_picture(stamp.time_ns);
+        self.schedule_networks(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
-        let Self { name, person, absence, relief, held, spread, matting, turn, .. } = self;
-        let mask = person.as_ref().map(Person::mask);
+        let Self { name, person, absence, relative_depth, subject_mask, upsampler, matting, due, .. } = self;
+        let mask = person.as_ref().map(PersonSegmenter::mask);
         if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
             tracing::warn!(
                 "{name}: no person was found for {} s, so everything is \
                             blurred",
-                Absence::LONG_NS / 1_000_000_000
+                Absence::MIN_REPORTED_NS / 1_000_000_000
             );
         }
-        run_depth(relief, (name, *turn), color, mask);
-        if let (Some(mask), Some(relief)) = (mask, &relief) {
-            held.complete(mask, relief);
+        run_depth_network(relative_depth, (name, *due), color, mask);
+        if let (Some(mask), Some(relative_depth)) = (mask, &relative_depth) {
+            subject_mask.complete_mask(mask, relative_depth);
         }
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
-        match &relief {
-            Some(relief) if person.is_some() => spread.over(relief.behind(), relief.size(), map),
-            Some(relief) if !self.has_subject => spread.over(relief.nearness(), relief.size(), map),
+        match &relative_depth {
+            Some(relative_depth) if person.is_some() => {
+                upsampler.upsample(relative_depth.background(), relative_depth.size(), map)
+            }
+            Some(relative_depth) if !self.has_subject => {
+                upsampler.upsample(relative_depth.nearness(), relative_depth.size(), map)
+            }
             _ => map.metres.fill(DepthMap::FAR_M),
         }
         // If the person network was disabled, the subject stays set, so that everything is blurred.
-        map.subject_m = (self.has_subject || relief.is_none()).then_some(DepthMap::SUBJECT_M);
+        map.subject_m = (self.has_subject || relative_depth.is_none()).then_some(DepthMap::SUBJECT_M);
         map.is_smooth = map.subject_m.is_none();
         if let Some(person) = &person {
-            let mask = if relief.is_some() { held.mask() } else { person.mask() };
+            let mask = if relative_depth.is_some() { subject_mask.mask() } else { person.mask() };
             matting.compute_matte(mask, color, None, map);
         }
         Ok(())
@@ -212,7 +222,7 @@ impl DepthSource for SingleCamera {
 
     fn efforts(&self) -> &'static [f64] {
         // Without a depth network, there is nothing to save.
-        if self.relief.is_some() { &EFFORTS } else { &EFFORTS[EFFORTS.len() - 1..] }
+        if self.relative_depth.is_some() { &EFFORTS } else { &EFFORTS[EFFORTS.len() - 1..] }
     }
 
     fn is_reusable(&self) -> bool {
@@ -220,7 +230,7 @@ impl DepthSource for SingleCamera {
     }
 
     fn set_effort(&mut self, effort: usize) {
-        self.effort = effort.min(EVERY.len() - 1);
+        self.effort = effort.min(DEPTH_INTERVALS.len() - 1);
         // Effort is only reduced when time is short, so frames arrive in real time.
         self.is_live = true;
     }
@@ -232,29 +242,29 @@ impl DepthSource for SingleCamera {
 
 impl Companion for SingleCamera {
     fn segment_persons(&mut self, FrameInput { stamp, color, .. }: FrameInput) -> Option<&Mask> {
-        self.begin_picture(stamp.time_ns);
+        self.schedule_networks(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
-        self.person.as_ref().map(Person::mask)
+        self.person.as_ref().map(PersonSegmenter::mask)
     }
 
     fn measure_background(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
-        run_depth(&mut self.relief, (&self.name, self.turn), color, Some(mask));
-        if let Some(relief) = &self.relief {
-            self.spread.over(relief.behind(), relief.size(), map);
+        run_depth_network(&mut self.relative_depth, (&self.name, self.due), color, Some(mask));
+        if let Some(relative_depth) = &self.relative_depth {
+            self.upsampler.upsample(relative_depth.background(), relative_depth.size(), map);
         }
     }
 }
 
 /// Upsamples nearness to distances, bilinearly.
 #[derive(Default)]
-struct Spread {
+struct NearnessUpsampler {
     /// Per output column, the two source columns.
     columns: Vec<Tap>,
     row: Vec<f32>,
 }
 
-impl Spread {
-    fn over(&mut self, nearness: &[f32], (width, height): (usize, usize), map: &mut DepthMap) {
+impl NearnessUpsampler {
+    fn upsample(&mut self, nearness: &[f32], (width, height): (usize, usize), map: &mut DepthMap) {
         let (to_width, to_height) = (map.width as usize, map.height as usize);
         self.columns.clear();
         self.columns.extend((0..to_width).map(|x| Tap::new(x, to_width, width)));

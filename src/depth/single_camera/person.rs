@@ -1,42 +1,42 @@
 //! Person mask from a network, temporally smoothed where it is unsure.
 
-use super::decision::Decision;
-use super::feed::{Answer, Feed};
+use super::mask_postprocess::MaskPostProcessor;
+use super::picture_network::{NetworkOutput, PictureNetwork};
 use crate::frame::{ColorImage, Mask};
 
 /// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
-const STEADINESS: f32 = 0.8;
+const PREVIOUS_WEIGHT: f32 = 0.8;
 const FRAME_NS: f32 = 1e9 / 30.0;
 
 /// Computes the person mask from frame to frame.
-pub struct Person {
-    feed: Feed,
+pub struct PersonSegmenter {
+    picture_network: PictureNetwork,
     /// The network's mask after temporal smoothing.
-    steady: Mask,
-    decision: Decision,
+    smoothed: Mask,
+    mask_postprocess: MaskPostProcessor,
     mask: Mask,
     /// Whether the network outputs logits: values outside of 0 to 1 were seen.
-    is_raw: bool,
+    is_logits: bool,
     /// When the previous picture was taken.
     seen_ns: Option<u64>,
 }
 
-impl Person {
-    pub fn new(feed: Feed) -> Self {
+impl PersonSegmenter {
+    pub fn new(picture_network: PictureNetwork) -> Self {
         Self {
-            feed,
-            steady: Mask::default(),
-            decision: Decision::default(),
+            picture_network,
+            smoothed: Mask::default(),
+            mask_postprocess: MaskPostProcessor::default(),
             mask: Mask::default(),
-            is_raw: false,
+            is_logits: false,
             seen_ns: None,
         }
     }
 
     /// Resets the state, for a new scene.
-    pub fn forget(&mut self) {
-        self.feed.forget();
-        self.decision.forget();
+    pub fn reset(&mut self) {
+        self.picture_network.reset();
+        self.mask_postprocess.reset();
         self.seen_ns = None;
     }
 
@@ -49,39 +49,39 @@ impl Person {
     /// decided ones not, so that nothing lags (as in MediaPipe).
     ///
     /// # Errors
-    /// See [`Feed::infer`].
+    /// See [`PictureNetwork::infer`].
     pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
-        let answer = self.feed.infer(color)?;
-        let pixels = answer.size.0 * answer.size.1;
+        let output = self.picture_network.infer(color)?;
+        let pixels = output.size.0 * output.size.1;
         let beyond = |alpha: f32| !(-0.01..=1.01).contains(&alpha);
-        self.is_raw |= (0..pixels).any(|pixel| beyond(answer.at(pixel, answer.channels - 1)));
-        let size = (answer.size.0 as u32, answer.size.1 as u32);
-        let before_ns = self.seen_ns.filter(|_| (self.steady.width, self.steady.height) == size);
-        let steadiness = before_ns.map_or(0.0, |before_ns| steadiness(time_ns.abs_diff(before_ns)));
-        self.steady.resize(size.0, size.1);
-        for (pixel, alpha) in self.steady.alpha.iter_mut().enumerate() {
-            let new = alpha_of(&answer, pixel, self.is_raw);
-            let keeps = steadiness * uncertainty(new);
+        self.is_logits |= (0..pixels).any(|pixel| beyond(output.at(pixel, output.channels - 1)));
+        let size = (output.size.0 as u32, output.size.1 as u32);
+        let before_ns = self.seen_ns.filter(|_| (self.smoothed.width, self.smoothed.height) == size);
+        let previous_weight = before_ns.map_or(0.0, |before_ns| previous_weight(time_ns.abs_diff(before_ns)));
+        self.smoothed.resize(size.0, size.1);
+        for (pixel, alpha) in self.smoothed.alpha.iter_mut().enumerate() {
+            let new = decode_alpha(&output, pixel, self.is_logits);
+            let keeps = previous_weight * uncertainty(new);
             *alpha = new + (*alpha - new) * keeps;
         }
         self.seen_ns = Some(time_ns);
-        self.decision.decide(&self.steady, time_ns, &mut self.mask);
+        self.mask_postprocess.postprocess(&self.smoothed, time_ns, &mut self.mask);
         Ok(())
     }
 }
 
 /// Returns the weight of a previous frame so long ago: a person has moved by then.
-fn steadiness(gap_ns: u64) -> f32 {
-    STEADINESS.powf((gap_ns as f32 / FRAME_NS).max(1.0))
+fn previous_weight(gap_ns: u64) -> f32 {
+    PREVIOUS_WEIGHT.powf((gap_ns as f32 / FRAME_NS).max(1.0))
 }
 
 /// Returns the mask value: of two channels, the second one is the person.
-fn alpha_of(answer: &Answer, pixel: usize, is_raw: bool) -> f32 {
-    let own = answer.at(pixel, answer.channels - 1);
-    match (is_raw, answer.channels) {
+fn decode_alpha(output: &NetworkOutput, pixel: usize, is_logits: bool) -> f32 {
+    let own = output.at(pixel, output.channels - 1);
+    match (is_logits, output.channels) {
         (false, _) => own.clamp(0.0, 1.0),
         (true, 1) => sigmoid(own),
-        (true, _) => sigmoid(own - answer.at(pixel, 0)),
+        (true, _) => sigmoid(own - output.at(pixel, 0)),
     }
 }
 
@@ -102,9 +102,12 @@ mod tests {
 
     #[test]
     fn what_was_seen_long_ago_says_little() {
-        assert!((steadiness(33_333_333) - 0.8).abs() < 1e-4 && steadiness(0) == 0.8, "nothing lags at a camera's pace");
-        assert!((steadiness(66_666_666) - 0.64).abs() < 1e-4, "as if the missing one had been seen");
-        assert!(steadiness(400_000_000) < 0.07);
+        assert!(
+            (previous_weight(33_333_333) - 0.8).abs() < 1e-4 && previous_weight(0) == 0.8,
+            "nothing lags at a camera's pace"
+        );
+        assert!((previous_weight(66_666_666) - 0.64).abs() < 1e-4, "as if the missing one had been seen");
+        assert!(previous_weight(400_000_000) < 0.07);
     }
 
     #[test]

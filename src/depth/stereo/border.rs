@@ -12,25 +12,25 @@ const STEP_COST: [u16; 2] = [1, 8];
 /// Cost of a change of brightness by one of 255 levels.
 const CHANGE_COST: u16 = 2;
 /// Rounds of raster sweeps down and up: paths that bend more often are found late, or not at all.
-const ROUNDS: usize = 2;
+const SWEEPS: usize = 2;
 
 /// Fills the border; owns its buffers.
 #[derive(Debug, Default)]
-pub struct Border {
+pub struct BorderFiller {
     /// Length of the shortest path found to each pixel of the strip, `[row][column]`.
     length: Vec<u16>,
     /// First known column of each row; 0 in rows without any disparity, which are not changed.
     first: Vec<usize>,
 }
 
-impl Border {
+impl BorderFiller {
     /// Allocates for maps of this size; nothing is allocated later.
     pub fn new((width, height): (usize, usize)) -> Self {
         Self { length: Vec::with_capacity(width * height), first: Vec::with_capacity(height) }
     }
 
     /// Returns the first known column of each row of the last map, 0 in rows without any disparity.
-    pub fn first(&self) -> &[usize] {
+    pub fn first_known_columns(&self) -> &[usize] {
         &self.first
     }
 
@@ -49,19 +49,27 @@ impl Border {
             self.length.extend((0..columns).map(|x| if x < first { u16::MAX } else { 0 }));
         }
         let height = self.first.len();
-        for _ in 0..ROUNDS {
+        for _ in 0..SWEEPS {
             for y in 0..height {
-                self.sweep(map, luma, width, columns, y, y.checked_sub(1));
+                self.relax_row(map, luma, width, columns, y, y.checked_sub(1));
             }
             for y in (0..height).rev() {
-                self.sweep(map, luma, width, columns, y, Some(y + 1).filter(|&y| y < height));
+                self.relax_row(map, luma, width, columns, y, Some(y + 1).filter(|&y| y < height));
             }
         }
     }
 
     /// Relaxes the paths to the pixels of row `y` through their neighbours in the row, on both sides, and in the
     /// adjacent row `other`, and copies the disparity at the start of each shorter path.
-    fn sweep(&mut self, map: &mut [u16], luma: &[u8], width: usize, columns: usize, y: usize, other: Option<usize>) {
+    fn relax_row(
+        &mut self,
+        map: &mut [u16],
+        luma: &[u8],
+        width: usize,
+        columns: usize,
+        y: usize,
+        other: Option<usize>,
+    ) {
         let mut relax = |x: usize, from_x: usize, from_y: usize| {
             let (to, from) = (y * width + x, from_y * width + from_x);
             let so_far = self.length[from_y * columns + from_x];

@@ -13,7 +13,7 @@ use pulp::Arch;
 
 use super::MatchError;
 use crate::frame::GrayImage;
-use search::{Coarse, Search, find_corners, halve, refine};
+use search::{MatchSearch, SearchPicture, find_corners, halve_picture, refine_subpixel};
 
 /// With fewer matches the verdict is unclear.
 const MIN_MATCHES: u32 = 12;
@@ -39,11 +39,11 @@ pub struct PairCheck {
     /// Deviation from that median within which six of ten points lie, in pixels.
     pub vertical_spread_px: f32,
     /// Fraction of points with a negative disparity: further to the right in the right picture.
-    pub negative_share: f32,
+    pub negative_fraction: f32,
     /// The largest disparity that several points have, in pixels; 0 without points.
     pub largest_px: f32,
     /// Whether both pictures are identical.
-    pub is_one: bool,
+    pub is_identical: bool,
 }
 
 /// Verdict on a pair.
@@ -52,14 +52,14 @@ pub enum Verdict {
     /// Rows match, and left and right are not swapped.
     Rectified,
     /// Rows do not match.
-    RowsOff {
+    Misaligned {
         /// Row offset within which most points lie, in pixels.
         px: f32,
     },
     /// Rows match, but left and right are swapped.
     Swapped,
     /// Both pictures are identical.
-    Same,
+    Identical,
     /// Too few points were found.
     Unclear {
         /// Points found in both pictures.
@@ -70,14 +70,14 @@ pub enum Verdict {
 impl PairCheck {
     /// Derives the verdict from the statistics.
     pub fn verdict(&self) -> Verdict {
-        let Self { matches, vertical_px, vertical_spread_px, negative_share, is_one, .. } = *self;
+        let Self { matches, vertical_px, vertical_spread_px, negative_fraction, is_identical, .. } = *self;
         if matches < MIN_MATCHES {
             Verdict::Unclear { matches }
-        } else if is_one {
-            Verdict::Same
+        } else if is_identical {
+            Verdict::Identical
         } else if vertical_px.abs() > MAX_ROW_OFFSET_PX || vertical_spread_px > MAX_ROW_SPREAD_PX {
-            Verdict::RowsOff { px: vertical_px.abs() + vertical_spread_px }
-        } else if negative_share > MAX_NEGATIVE_FRACTION {
+            Verdict::Misaligned { px: vertical_px.abs() + vertical_spread_px }
+        } else if negative_fraction > MAX_NEGATIVE_FRACTION {
             Verdict::Swapped
         } else {
             Verdict::Rectified
@@ -89,9 +89,9 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Rectified => write!(f, "the pair is rectified"),
-            Self::RowsOff { px } => write!(f, "the pair is not rectified: rows are off by up to {px:.1} px"),
+            Self::Misaligned { px } => write!(f, "the pair is not rectified: rows are off by up to {px:.1} px"),
             Self::Swapped => write!(f, "left and right are swapped: disparities are negative; swap the pictures"),
-            Self::Same => {
+            Self::Identical => {
                 write!(
                     f,
                     "left and right are the same picture, so nothing has a distance; give the pictures of the \
@@ -112,53 +112,57 @@ impl fmt::Display for Verdict {
 ///
 /// # Errors
 /// Fails if the pictures differ in size.
-pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<PairCheck, MatchError> {
+pub fn check_pair(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<PairCheck, MatchError> {
     if left.size() != right.size() {
         return Err(MatchError::Sizes { left: left.size(), right: right.size() });
     }
-    let halves = [halve(left), halve(right)];
-    let coarse = halves.each_ref().map(|half| Coarse::new(half, disparities.min(left.width) as i32 / 2));
+    let halves = [halve_picture(left), halve_picture(right)];
+    let search_pictures =
+        halves.each_ref().map(|half| SearchPicture::new(half, disparities.min(left.width) as i32 / 2));
     let arch = Arch::new();
     let mut scores = Vec::new();
     let mut search = |from: usize, at| {
-        arch.dispatch(Search { from: &halves[from], into: &coarse[1 - from], at, scores: &mut scores })
+        arch.dispatch(MatchSearch { from: &halves[from], into: &search_pictures[1 - from], at, scores: &mut scores })
     };
-    let mut moved_px: Vec<(f32, f32)> = Vec::new();
+    let mut displacements_px: Vec<(f32, f32)> = Vec::new();
     for (x, y) in find_corners(&halves[0]) {
         let Some((dx, dy)) = search(0, (x, y)) else { continue };
         let Some((back_dx, back_dy)) = search(1, (x + dx, y + dy)) else { continue };
         // Only mutual best matches, within a pixel at half resolution.
         if (dx + back_dx).abs() <= 1 && (dy + back_dy).abs() <= 1 {
-            moved_px.extend(refine(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
+            displacements_px.extend(refine_subpixel(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
         }
     }
     // Without matches the verdict is unclear even for identical pictures.
-    Ok(PairCheck { is_one: !moved_px.is_empty() && left.luma == right.luma, ..summary(&moved_px) })
+    Ok(PairCheck {
+        is_identical: !displacements_px.is_empty() && left.luma == right.luma,
+        ..compute_statistics(&displacements_px)
+    })
 }
 
 /// Computes statistics of the displacements (across, down) of all matched points, from left to right picture.
-fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
-    if moved_px.is_empty() {
+fn compute_statistics(displacements_px: &[(f32, f32)]) -> PairCheck {
+    if displacements_px.is_empty() {
         return PairCheck::default();
     }
     let quantile = |values: &mut Vec<f32>, fraction: f32| {
         let at = (values.len() as f32 * fraction) as usize;
         *values.select_nth_unstable_by(at, f32::total_cmp).1
     };
-    let mut down_px: Vec<f32> = moved_px.iter().map(|&(_, down_px)| down_px).collect();
+    let mut down_px: Vec<f32> = displacements_px.iter().map(|&(_, down_px)| down_px).collect();
     let vertical_px = quantile(&mut down_px, 0.5);
     down_px.iter_mut().for_each(|down_px| *down_px = (*down_px - vertical_px).abs());
     // A disparity is a displacement to the left, hence the sign.
-    let negative = moved_px.iter().filter(|&&(across_px, _)| -across_px < NEGATIVE_PX).count();
-    let mut disparities_px: Vec<f32> = moved_px.iter().map(|&(across_px, _)| -across_px).collect();
+    let negative = displacements_px.iter().filter(|&&(across_px, _)| -across_px < NEGATIVE_PX).count();
+    let mut disparities_px: Vec<f32> = displacements_px.iter().map(|&(across_px, _)| -across_px).collect();
     disparities_px.sort_unstable_by(|a, b| b.total_cmp(a));
-    let rank = MIN_DISPARITY_POINTS.max((MIN_DISPARITY_FRACTION * moved_px.len() as f32) as usize);
+    let rank = MIN_DISPARITY_POINTS.max((MIN_DISPARITY_FRACTION * displacements_px.len() as f32) as usize);
     PairCheck {
         largest_px: disparities_px.get(rank - 1).map_or(0.0, |largest_px| largest_px.max(0.0)),
-        matches: moved_px.len() as u32,
+        matches: displacements_px.len() as u32,
         vertical_px,
         vertical_spread_px: quantile(&mut down_px, 0.6),
-        negative_share: negative as f32 / moved_px.len() as f32,
-        is_one: false,
+        negative_fraction: negative as f32 / displacements_px.len() as f32,
+        is_identical: false,
     }
 }

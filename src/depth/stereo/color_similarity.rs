@@ -29,17 +29,17 @@ const SPACING_PX: usize = 2;
 /// The colours of a map's pixels.
 #[derive(Clone, Copy)]
 pub struct Colors<'a> {
-    /// The picture, as large as the map times `every`.
+    /// The picture, as large as the map times `stride`.
     pub image: &'a ColorImage,
     /// Step in columns and rows of the picture from one pixel of the map to the next.
-    pub every: usize,
+    pub stride: usize,
 }
 
 impl Colors<'_> {
     /// Returns the colour bin of a pixel: 5 bits for each of two channel differences, which shading changes little, and
     /// 2 for the brightness.
-    fn at(&self, x: usize, y: usize) -> usize {
-        let at = 3 * self.every * (y * self.image.width as usize + x);
+    fn color_bin_at(&self, x: usize, y: usize) -> usize {
+        let at = 3 * self.stride * (y * self.image.width as usize + x);
         let [red, green, blue] = [0, 1, 2].map(|channel| usize::from(self.image.rgb[at + channel]));
         (red + 256 - green) >> 4 << 7 | (blue + 256 - green) >> 4 << 2 | (red + 2 * green + blue) >> 8
     }
@@ -54,12 +54,12 @@ fn is_grey(color: usize) -> bool {
 
 /// A number of pixels and the sum of their disparities in 1/8 px, which fits for pictures of 8 million pixels.
 #[derive(Clone, Copy, Debug, Default)]
-struct Tally {
+struct DisparitySum {
     count: u32,
     sum: u32,
 }
 
-impl Tally {
+impl DisparitySum {
     const UNIT: u16 = ONE / 8;
 
     fn mean(self) -> u16 {
@@ -67,7 +67,7 @@ impl Tally {
     }
 }
 
-impl AddAssign for Tally {
+impl AddAssign for DisparitySum {
     fn add_assign(&mut self, other: Self) {
         self.count += other.count;
         self.sum += other.sum;
@@ -78,7 +78,7 @@ impl AddAssign for Tally {
 #[derive(Debug, Default)]
 pub struct ColorSimilarity {
     /// Known pixels by colour and disparity bin.
-    tallies: Vec<[Tally; BINS]>,
+    sums: Vec<[DisparitySum; BINS]>,
     /// Number of known pixels by colour.
     counts: Vec<u32>,
     /// Disparity of the surface that each colour identifies, or unknown.
@@ -90,14 +90,14 @@ pub struct ColorSimilarity {
 impl ColorSimilarity {
     /// Corrects the filled pixels of `map`: those left of column `first` of their row.
     pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
-        self.prepare(map.len());
+        self.clear_and_reserve(map.len());
         let columns = first.iter().max().map_or(0, |&most| (most + 1).min(width));
         if columns < 2 {
             return;
         }
-        self.learn(map, width, first, (LEARNED_WIDTHS * columns).min(width), colors);
+        self.learn_surfaces(map, width, first, (LEARNED_WIDTHS * columns).min(width), colors);
         for y in 0..first.len() {
-            self.border_surfaces.extend((0..columns).map(|x| self.surfaces[colors.at(x, y)]));
+            self.border_surfaces.extend((0..columns).map(|x| self.surfaces[colors.color_bin_at(x, y)]));
         }
         for (y, (row, &first)) in map.chunks_exact_mut(width).zip(first).enumerate() {
             for (x, d) in row[..first].iter_mut().enumerate() {
@@ -111,8 +111,8 @@ impl ColorSimilarity {
 
     /// Clears the results and reserves the memory for maps of `pixels` pixels, so that a wider border later allocates
     /// nothing.
-    fn prepare(&mut self, pixels: usize) {
-        self.tallies.resize(COLORS, [Tally::default(); BINS]);
+    fn clear_and_reserve(&mut self, pixels: usize) {
+        self.sums.resize(COLORS, [DisparitySum::default(); BINS]);
         self.counts.resize(COLORS, 0);
         self.surfaces.clear();
         self.surfaces.reserve(COLORS);
@@ -122,29 +122,29 @@ impl ColorSimilarity {
 
     /// Learns which surface each colour identifies, from every other column and row of the known pixels of the first
     /// `end` columns; `first` has the first known column of each row.
-    fn learn(&mut self, map: &[u16], width: usize, first: &[usize], end: usize, colors: Colors) {
+    fn learn_surfaces(&mut self, map: &[u16], width: usize, first: &[usize], end: usize, colors: Colors) {
         self.counts.fill(0);
         for (y, (row, &first)) in map.chunks_exact(width).zip(first).enumerate().step_by(2) {
             for (x, &d) in row[..end].iter().enumerate().skip(first).step_by(2) {
                 if is_known(d) {
-                    let color = colors.at(x, y);
+                    let color = colors.color_bin_at(x, y);
                     // Cleared on first use: most colours do not occur.
                     if self.counts[color] == 0 {
-                        self.tallies[color] = [Tally::default(); BINS];
+                        self.sums[color] = [DisparitySum::default(); BINS];
                     }
                     self.counts[color] += 1;
                     let bin = usize::from(d / MIN_GAP).min(BINS - 1);
-                    self.tallies[color][bin] += Tally { count: 1, sum: u32::from(d / Tally::UNIT) };
+                    self.sums[color][bin] += DisparitySum { count: 1, sum: u32::from(d / DisparitySum::UNIT) };
                 }
             }
         }
-        self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
+        self.surfaces.extend(self.counts.iter().zip(&self.sums).enumerate().map(|(color, (&count, sums))| {
             if count < MIN_PIXELS || is_grey(color) {
                 return UNKNOWN;
             }
             // A surface may extend over two adjacent bins.
-            let mut best = Tally::default();
-            for pair in tallies.windows(2) {
+            let mut best = DisparitySum::default();
+            for pair in sums.windows(2) {
                 let mut both = pair[0];
                 both += pair[1];
                 if both.count > best.count {
@@ -191,11 +191,11 @@ mod tests {
 
     /// Corrects a scene with a near green surface before a far wall, and a patch of this colour in the border, filled
     /// as wall.
-    fn corrected(patch: [u8; 3], every: usize) -> Vec<u16> {
+    fn corrected(patch: [u8; 3], stride: usize) -> Vec<u16> {
         let (width, height) = SIZE;
-        let mut image = ColorImage::new((width * every) as u32, (height * every) as u32);
+        let mut image = ColorImage::new((width * stride) as u32, (height * stride) as u32);
         for (k, rgb) in image.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            let (x, y) = (k % (width * every) / every, k / (width * every) / every);
+            let (x, y) = (k % (width * stride) / stride, k / (width * stride) / stride);
             *rgb = if is_patch(x, y) {
                 patch
             } else if is_near(x) {
@@ -205,14 +205,14 @@ mod tests {
             };
         }
         let mut map: Vec<u16> = (0..width * height).map(|k| if is_near(k % width) { NEAR } else { FAR }).collect();
-        ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], Colors { image: &image, every });
+        ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], Colors { image: &image, stride });
         map
     }
 
     #[test]
     fn a_patch_of_the_near_surfaces_colour_is_near() {
-        for every in [1, 2] {
-            for (k, d) in corrected(GREEN, every).into_iter().enumerate() {
+        for stride in [1, 2] {
+            for (k, d) in corrected(GREEN, stride).into_iter().enumerate() {
                 let (x, y) = (k % SIZE.0, k / SIZE.0);
                 // Its corners have too few pixels of their colour around them.
                 let corner = [4, 5, 10, 11].contains(&x) && [10, 11, 18, 19].contains(&y);
@@ -233,13 +233,13 @@ mod tests {
         image.rgb = GREEN.repeat(width * height);
         let half: Vec<u16> = (0..width * height).map(|k| if k % width < 40 { FAR } else { NEAR }).collect();
         let mut map = half.clone();
-        let colors = Colors { image: &image, every: 1 };
+        let colors = Colors { image: &image, stride: 1 };
         ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
         assert_eq!(map, half);
         image.rgb.fill(100);
         let mut map: Vec<u16> = (0..width * height).map(|k| if k % width < UNSEEN { FAR } else { NEAR }).collect();
         let before = map.clone();
-        let colors = Colors { image: &image, every: 1 };
+        let colors = Colors { image: &image, stride: 1 };
         ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
         assert_eq!(map, before);
     }
@@ -253,7 +253,7 @@ mod tests {
         for surface in [NEAR, FAR] {
             let mut map: Vec<u16> =
                 (0..width * height).map(|k| if k % width < UNSEEN { 30 * ONE } else { surface }).collect();
-            similarity.correct(&mut map, width, &first, Colors { image: &image, every: 1 });
+            similarity.correct(&mut map, width, &first, Colors { image: &image, stride: 1 });
             assert_eq!(map, vec![surface; width * height]);
         }
     }

@@ -17,10 +17,15 @@ pub trait Executor: Send {
 
     /// Writes the disparities of the left picture to `out`, in fixed point ([`super::fixed`]). `pair` are the grey
     /// values of the left and the right picture, row by row. Pixels that have not changed since the last pair prefer
-    /// their last disparity. Islands are removed; gaps are filled along their row and marked
+    /// their last disparity. Speckles are removed; gaps are filled along their row and marked
     /// ([`super::fixed::FILLED`]), but pixels left of the first known one of a row stay unknown.
     ///
     /// # Errors
     /// Fails if the GPU fails.
-    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError>;
+    fn compute_disparities(
+        &mut self,
+        pair: [&[u8]; 2],
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) -> Result<(), GpuError>;
 }

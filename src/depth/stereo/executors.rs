@@ -58,29 +58,30 @@ impl Executors {
     }
 
     /// Creates an executor for pictures of `size` (columns, rows) and at least `disparities` candidates, at most 256,
-    /// that removes islands of up to `island` pixels.
+    /// that removes speckles of up to `max_speckle` pixels.
     ///
     /// # Errors
     /// Fails if the required GPU lacks memory or fails.
-    pub fn executor(
+    pub fn create_executor(
         &self,
         size: (usize, usize),
         disparities: usize,
-        island: u32,
+        max_speckle: u32,
     ) -> Result<Box<dyn Executor>, GpuError> {
         #[cfg(feature = "gpu")]
         if let Some((device, is_required)) = &self.gpu {
-            match GpuExecutor::new(device, size, disparities, island) {
+            match GpuExecutor::new(device, size, disparities, max_speckle) {
                 Ok(gpu) => {
                     let threads = self.threads;
-                    let cpu: MakeCpu = Box::new(move || Box::new(CpuExecutor::new(size, disparities, island, threads)));
+                    let cpu: MakeCpu =
+                        Box::new(move || Box::new(CpuExecutor::new(size, disparities, max_speckle, threads)));
                     return Ok(Box::new(WithFallback::new(Box::new(gpu) as Box<dyn Executor>, cpu)));
                 }
                 Err(error) if *is_required => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
             }
         }
-        Ok(Box::new(CpuExecutor::new(size, disparities, island, self.threads)))
+        Ok(Box::new(CpuExecutor::new(size, disparities, max_speckle, self.threads)))
     }
 }
 
@@ -98,9 +99,14 @@ impl Executor for WithFallback<Box<dyn Executor>, MakeCpu> {
         self.worker().device()
     }
 
-    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+    fn compute_disparities(
+        &mut self,
+        pair: [&[u8]; 2],
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) -> Result<(), GpuError> {
         // After a fault the CPU matches the same pair, so that none is lost; only the temporal prior is lost with the
         // GPU.
-        self.run("matches", |executor| executor.disparities(pair, workers, out), |_, make| Ok(make()))
+        self.run("matches", |executor| executor.compute_disparities(pair, workers, out), |_, make| Ok(make()))
     }
 }

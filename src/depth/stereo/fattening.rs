@@ -6,23 +6,23 @@
 //! of the two surfaces that meet there, by the likelihood of its colour: a kernel density estimate from samples of
 //! both. The number of samples does not count, as the nearer surface has too many.
 
+mod classify;
+mod discontinuities;
 mod guide;
-mod jumps;
-mod vote;
 
 use std::iter;
 use std::sync::atomic::AtomicBool;
 
+use classify::{ClassifyRow, LANES};
+use discontinuities::UncertainPixels;
 use guide::Guide;
-use jumps::UncertainPixels;
 use pulp::Arch;
-use vote::{LANES, Row};
 
 use super::color_similarity::Colors;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Corrects maps of one size; owns its buffers.
-pub struct Fattening {
+pub struct FatteningCorrection {
     width: usize,
     uncertain: UncertainPixels,
     guide: Guide,
@@ -31,7 +31,7 @@ pub struct Fattening {
     arch: Arch,
 }
 
-impl Fattening {
+impl FatteningCorrection {
     /// Allocates for maps of this size.
     pub fn new((width, height): (usize, usize)) -> Self {
         Self {
@@ -61,9 +61,9 @@ impl Fattening {
         }
         uncertain.find(found, workers, arch);
         let guide = guide.fill_channels(luma, colors, width, workers, taken);
-        let (height, others) = (found.len() / width, uncertain.others());
+        let (height, other_sides) = (found.len() / width, uncertain.other_sides());
         let out = DisjointParts::new(into, width, taken);
-        workers.run(height, &|y| arch.dispatch(Row { found, others, guide, width, y, out: out.part(y) }));
+        workers.run(height, &|y| arch.dispatch(ClassifyRow { found, other_sides, guide, width, y, out: out.part(y) }));
     }
 }
 

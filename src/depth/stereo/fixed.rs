@@ -19,28 +19,28 @@ pub fn is_known(disparity: u16) -> bool {
 const COUNTS: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
 
 /// Returns the number of candidates that executors try for at least `disparities`, at most 256.
-pub fn range(disparities: usize) -> usize {
-    COUNTS.into_iter().find(|&range| range >= disparities).unwrap_or(COUNTS[COUNTS.len() - 1])
+pub fn candidate_count(disparities: usize) -> usize {
+    COUNTS.into_iter().find(|&candidate_count| candidate_count >= disparities).unwrap_or(COUNTS[COUNTS.len() - 1])
 }
 
 /// Cost of a partner beyond the border of the right picture: that of a poor match, so that the outermost columns may
 /// take the disparity of their neighbours.
-pub const OUTSIDE: u8 = 8;
+pub const OUTSIDE_COST: u8 = 8;
 
 /// The penalty P1 for a disparity that differs by one from that of the previous pixel.
 pub const P1: u8 = 8;
 
 /// Reduction of the cost of the likely disparity and of those one above and below it.
-pub const BONUS: u8 = 2;
+pub const PRIOR_BONUS: u8 = 2;
 
 /// Left-right consistency: the largest difference between the left and the right disparity, in whole pixels.
-pub const AGREE: u8 = 1;
+pub const MAX_LR_DIFFERENCE: u8 = 1;
 
-/// Neighbours whose disparities differ by more, in fixed point, belong to different islands.
-pub const STEP: u16 = 2 * ONE;
+/// Neighbours whose disparities differ by more, in fixed point, belong to different components.
+pub const MAX_SPECKLE_STEP: u16 = 2 * ONE;
 
 /// Temporal change summed over 3x3 pixels, in 8-bit codes, up to which it counts as noise: 4 per pixel.
-pub const NOISE: u16 = 36;
+pub const MAX_NOISE: u16 = 36;
 
 #[cfg(test)]
 mod tests {
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn as_many_disparities_are_tried_as_are_asked_for_and_no_needless_ones() {
-        assert!(COUNTS.is_sorted() && COUNTS.into_iter().all(|exact| range(exact) == exact));
-        assert_eq!([1, 17, 193, 256, 1000].map(range), [16, 32, 256, 256, 256]);
+        assert!(COUNTS.is_sorted() && COUNTS.into_iter().all(|exact| candidate_count(exact) == exact));
+        assert_eq!([1, 17, 193, 256, 1000].map(candidate_count), [16, 32, 256, 256, 256]);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that pass the left-right consistency check and
 //! fills the gaps between them, in integers, so that all executors agree to the bit ([`fixed`]); the post-processing is
-//! common to all (`tidy`).
+//! common to all (`postprocess`).
 
 mod border;
 pub mod check;
@@ -19,9 +19,9 @@ mod gaps;
 pub mod gpu;
 mod half;
 mod penalty;
+mod postprocess;
 mod rectify;
 pub mod source;
-mod tidy;
 
 use std::iter;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ use std::sync::atomic::AtomicBool;
 use color_similarity::Colors;
 use executor::Executor;
 use executors::Executors;
-use tidy::PostProcessor;
+use postprocess::PostProcessor;
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 use crate::compute::{Backend, Device, GpuError};
@@ -42,7 +42,7 @@ use crate::names::named;
 pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
-    /// Number of candidate disparities, from 0 on: rounded up ([`fixed::range`]), at most
+    /// Number of candidate disparities, from 0 on: rounded up ([`fixed::candidate_count`]), at most
     /// [`Settings::MAX_DISPARITIES`].
     pub disparities: u32,
     /// Resolution at which pairs are matched.
@@ -96,7 +96,7 @@ pub trait Matcher: Send {
     ///
     /// # Errors
     /// Fails if the pictures do not have the size in the settings, or the GPU fails.
-    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError>;
+    fn compute_disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError>;
 }
 
 /// Error of matching a pair.
@@ -133,12 +133,12 @@ pub enum MatchError {
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
     let workers = ThreadPool::new("match", settings.threads);
     let executors = Executors::new(backend, adapter, workers.thread_count())?;
-    let level = |effort| Level::new(settings, effort, &executors);
-    Ok(Box::new(Matching {
+    let level = |effort| EffortLevel::new(settings, effort, &executors);
+    Ok(Box::new(StereoMatcher {
         settings: *settings,
         levels: [level(Effort::Fast)?, level(Effort::Full)?],
         workers,
-        small: [GrayImage::default(), GrayImage::default()],
+        half_pair: [GrayImage::default(), GrayImage::default()],
         taken: iter::repeat_with(AtomicBool::default).take(settings.size.1 as usize).collect(),
     }))
 }
@@ -146,39 +146,39 @@ pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> R
 /// Speckles of at most this many pixels are treated as mismatches, at full resolution.
 const SPECKLE: u32 = 100;
 
-struct Matching {
+struct StereoMatcher {
     settings: Settings,
     workers: ThreadPool,
     /// Indexed by [`Effort`].
-    levels: [Level; 2],
+    levels: [EffortLevel; 2],
     /// Left and right picture at half resolution.
-    small: [GrayImage; 2],
+    half_pair: [GrayImage; 2],
     /// A flag per row, with which [`DisjointParts`] ensures that only one thread writes it.
     taken: Vec<AtomicBool>,
 }
 
 /// State of one effort.
-struct Level {
+struct EffortLevel {
     executor: Box<dyn Executor>,
-    tidy: PostProcessor,
+    postprocessor: PostProcessor,
     /// Disparities in fixed point, as the executor returns them.
     map: Vec<u16>,
     /// Disparities of the half-size pair in pixels; empty at full size, where they go to the caller's map.
     px: Vec<f32>,
 }
 
-impl Level {
+impl EffortLevel {
     fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
-        let (size, disparities, island) = match effort {
+        let (size, disparities, max_speckle) = match effort {
             // At half resolution a speckle has a quarter of its pixels.
             Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2), SPECKLE / 4),
             Effort::Full => (whole, settings.disparities, SPECKLE),
         };
         let pixels = size.0 * size.1;
         Ok(Self {
-            executor: executors.executor(size, disparities as usize, island)?,
-            tidy: PostProcessor::new(size),
+            executor: executors.create_executor(size, disparities as usize, max_speckle)?,
+            postprocessor: PostProcessor::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
         })
@@ -193,15 +193,15 @@ impl Level {
         workers: &mut ThreadPool,
         into: Option<&mut [f32]>,
     ) -> Result<(), GpuError> {
-        let Self { executor, tidy, map, px } = self;
+        let Self { executor, postprocessor, map, px } = self;
         let [luma, right] = pair.map(|picture| &*picture.luma);
-        executor.disparities([luma, right], workers, map)?;
-        tidy.fill(map, luma, colors, workers, into.unwrap_or(px));
+        executor.compute_disparities([luma, right], workers, map)?;
+        postprocessor.postprocess(map, luma, colors, workers, into.unwrap_or(px));
         Ok(())
     }
 }
 
-impl Matcher for Matching {
+impl Matcher for StereoMatcher {
     fn describe(&self) -> String {
         self.levels[self.settings.effort as usize].executor.describe()
     }
@@ -214,7 +214,7 @@ impl Matcher for Matching {
         self.settings.effort = effort;
     }
 
-    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
+    fn compute_disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
         let Pair { left, color, right } = pair;
         if left.size() != right.size() {
             return Err(MatchError::Sizes { left: left.size(), right: right.size() });
@@ -225,16 +225,16 @@ impl Matcher for Matching {
             }
         }
         // Half-size pictures are matched with every second pixel of the colour image.
-        let colors = |every| color.map(|image| Colors { image, every });
+        let colors = |stride| color.map(|image| Colors { image, stride });
         into.resize(left.width, left.height);
-        let Self { settings, workers, levels, small, taken } = self;
+        let Self { settings, workers, levels, half_pair, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
             Effort::Full => level.match_pair([left, right], colors(1), workers, Some(&mut into.px))?,
             Effort::Fast => {
-                half::downsample(left, &mut small[0]);
-                half::downsample(right, &mut small[1]);
-                let [small_left, small_right] = &*small;
+                half::downsample(left, &mut half_pair[0]);
+                half::downsample(right, &mut half_pair[1]);
+                let [small_left, small_right] = &*half_pair;
                 level.match_pair([small_left, small_right], colors(2), workers, None)?;
                 let (px, rows) = (&level.px, DisjointParts::new(&mut into.px, left.width as usize, taken));
                 workers.run(left.height as usize, &|y| half::upsample_row(left, small_left, px, y, rows.part(y)));

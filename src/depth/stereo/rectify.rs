@@ -43,18 +43,18 @@ impl PairRectifier {
     }
 
     /// Rectifies the left picture into `into`.
-    pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
+    pub fn rectify_left(&mut self, from: &ColorImage, into: &mut ColorImage) {
         #[cfg(feature = "gpu")]
-        if self.gpu.try_run("rectifies", |gpu| gpu.left(from, into)) {
+        if self.gpu.try_run("rectifies", |gpu| gpu.rectify_left(from, into)) {
             return;
         }
         self.rectifier.rectify_left(from, into);
     }
 
     /// Rectifies the right picture into `into`.
-    pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
+    pub fn rectify_right(&mut self, from: &GrayImage, into: &mut GrayImage) {
         #[cfg(feature = "gpu")]
-        if self.gpu.try_run("rectifies", |gpu| gpu.right(from, into)) {
+        if self.gpu.try_run("rectifies", |gpu| gpu.rectify_right(from, into)) {
             return;
         }
         self.rectifier.rectify_right(from, into);

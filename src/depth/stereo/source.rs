@@ -2,10 +2,10 @@
 //!
 //! The blur needs only the disparity: with `z = f B / (d + doffs)`, the thin lens `c = c_inf (1 - z_f / z)` is `c =
 //! (c_inf / d_f) (d_f - d)`, counted from the disparity of infinity, which is `(A / 2B) (d_f - d)` for an aperture of
-//! diameter `A`. Focal length and baseline cancel out, so that an uncalibrated rig ([`StereoRig::default_for_width`]) blurs as
-//! well as a measured one; only its distances in metres are meaningless.
+//! diameter `A`. Focal length and baseline cancel out, so that an uncalibrated rig ([`StereoRig::default_for_width`])
+//! blurs as well as a measured one; only its distances in metres are meaningless.
 
-use super::check::{Verdict, check};
+use super::check::{Verdict, check_pair};
 use super::rectify::PairRectifier;
 use super::{Effort, Matcher, Pair, Settings};
 use crate::calibration::rectifier::Rectifier;
@@ -27,7 +27,7 @@ const EFFORTS: [f64; 2] = [0.33, 1.0];
 /// Margin in pixels above the largest disparity found, for objects that come nearer later.
 const MARGIN_PX: u32 = 8;
 
-type Widen = Box<dyn Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send>;
+type CreateMatcher = Box<dyn Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send>;
 
 /// Computes depth from the frames of a camera that delivers a right picture.
 pub struct StereoDepth {
@@ -42,7 +42,7 @@ pub struct StereoDepth {
     disparity: DisparityMap,
     disparities: u32,
     /// Makes a matcher with more candidate disparities.
-    widen: Option<Widen>,
+    create_wider: Option<CreateMatcher>,
     /// Number of pairs that may still be checked for rectification.
     checks_left: u32,
 }
@@ -50,7 +50,7 @@ pub struct StereoDepth {
 impl StereoDepth {
     /// Creates a source that matches rectified pairs of `rig` with `matcher`, which has `disparities` candidates.
     /// `source_name` names the camera in messages.
-    pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
+    pub fn from_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         Self {
             source_name: source_name.to_owned(),
             rig,
@@ -61,46 +61,49 @@ impl StereoDepth {
             right: GrayImage::default(),
             disparity: DisparityMap::default(),
             disparities,
-            widen: None,
+            create_wider: None,
             checks_left: MAX_CHECKS,
         }
     }
 
     /// Creates a source that rectifies pairs with `rectifier`, left pictures included, on the GPU of the matcher if it
     /// has one.
-    pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
+    pub fn from_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
         let rectifier = PairRectifier::new(rectifier);
         #[cfg(feature = "gpu")]
         let rectifier = rectifier.with_device(matcher.device());
-        Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
+        Self { rectifier: Some(rectifier), ..Self::from_rectified(source_name, rig, matcher, disparities) }
     }
 
-    /// Lets `widen` replace the matcher if the first pairs have larger disparities than it tries; without it, that is
-    /// only logged.
-    pub fn widening(self, widen: impl Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send + 'static) -> Self {
-        Self { widen: Some(Box::new(widen)), ..self }
+    /// Lets `create_wider` replace the matcher if the first pairs have larger disparities than it tries; without it,
+    /// that is only logged.
+    pub fn with_wider_matcher(
+        self,
+        create_wider: impl Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send + 'static,
+    ) -> Self {
+        Self { create_wider: Some(Box::new(create_wider)), ..self }
     }
 
     /// Checks a pair and its range of disparities, unless an earlier check was conclusive.
-    fn check(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
+    fn check_pair(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
         if self.checks_left == 0 {
             return Ok(());
         }
         let right = right.unwrap_or(&self.right);
         let (source_name, calibrated) = (&self.source_name, self.rectifier.is_some());
         // Twice the range, so that objects nearer than expected are found, too.
-        let found = check(&self.left, right, (2 * self.disparities).min(Settings::MAX_DISPARITIES))?;
-        let clear = log_check((source_name, calibrated), found.verdict());
+        let found = check_pair(&self.left, right, (2 * self.disparities).min(Settings::MAX_DISPARITIES))?;
+        let clear = log_verdict((source_name, calibrated), found.verdict());
         self.checks_left = if clear { 0 } else { self.checks_left - 1 };
         let needed = (found.largest_px.ceil() as u32 + MARGIN_PX).next_multiple_of(16).min(Settings::MAX_DISPARITIES);
         if found.verdict() != Verdict::Rectified || found.largest_px < self.disparities as f32 {
             return Ok(());
         }
         let largest_px = found.largest_px;
-        match &self.widen {
-            Some(widen) => {
-                (self.matcher, self.disparities) = (widen(needed)?, needed);
+        match &self.create_wider {
+            Some(create_wider) => {
+                (self.matcher, self.disparities) = (create_wider(needed)?, needed);
                 tracing::info!(
                     "{source_name}: near objects have disparities of {largest_px:.0} px: {needed} are \
                                 searched"
@@ -128,17 +131,17 @@ impl StereoDepth {
 
 /// Logs the verdict on a pair that is supposed to be rectified; `calibrated` says whether it was rectified here.
 /// Returns false if the verdict is unclear.
-fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool {
+fn log_verdict((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool {
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
-        Verdict::RowsOff { .. } if calibrated => tracing::warn!(
+        Verdict::Misaligned { .. } if calibrated => tracing::warn!(
             "{source_name}: {verdict}, although it was rectified: the calibration does not match the present position \
              of the cameras; calibrate them again"
         ),
-        Verdict::RowsOff { .. } => {
+        Verdict::Misaligned { .. } => {
             tracing::warn!("{source_name}: {verdict}; rectify it with --calib FILE, and without --rectified");
         }
-        Verdict::Swapped | Verdict::Same => tracing::warn!("{source_name}: {verdict}"),
+        Verdict::Swapped | Verdict::Identical => tracing::warn!("{source_name}: {verdict}"),
         Verdict::Unclear { .. } => {
             tracing::debug!("{source_name}: {verdict}");
             return false;
@@ -150,27 +153,27 @@ fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool 
 impl DepthSource for StereoDepth {
     fn rectify(&mut self, color: &mut ColorImage) {
         if let Some(rectifier) = &mut self.rectifier {
-            rectifier.left(color, &mut self.color);
+            rectifier.rectify_left(color, &mut self.color);
             std::mem::swap(color, &mut self.color);
         }
     }
 
     fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let Some(right) = seen.right else {
-            return Err(DepthError::OneEye { source_name: self.source_name.clone() });
+            return Err(DepthError::MissingRight { source_name: self.source_name.clone() });
         };
         self.left.set_luma_from(seen.color);
         let rectified = match &mut self.rectifier {
             Some(rectifier) => {
-                rectifier.right(right, &mut self.right);
+                rectifier.rectify_right(right, &mut self.right);
                 None
             }
             None => Some(right),
         };
-        self.check(rectified)?;
+        self.check_pair(rectified)?;
         let pair = Pair { left: &self.left, color: Some(seen.color), right: rectified.unwrap_or(&self.right) };
-        self.matcher.disparity(pair, &mut self.disparity)?;
-        metres(&self.disparity, &self.rig, map);
+        self.matcher.compute_disparity(pair, &mut self.disparity)?;
+        disparity_to_depth(&self.disparity, &self.rig, map);
         Ok(())
     }
 
@@ -185,7 +188,7 @@ impl DepthSource for StereoDepth {
 
 /// Converts disparity to depth. Unknown pixels stay 0; those at infinity, or beyond it by measurement error, get the
 /// largest depth that can be measured.
-pub fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
+pub fn disparity_to_depth(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
     map.resize(disparity.width, disparity.height);
     let (focal_baseline, doffs_px) = (rig.focal_px * rig.baseline_m, rig.doffs_px);
     for (z_m, &d_px) in map.metres.iter_mut().zip(&disparity.px) {
@@ -217,7 +220,7 @@ mod tests {
         fn set_effort(&mut self, effort: Effort) {
             self.0 = effort;
         }
-        fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
+        fn compute_disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
             let Pair { left, right, .. } = pair;
             if left.size() != right.size() {
                 return Err(MatchError::Sizes { left: left.size(), right: right.size() });
@@ -245,11 +248,11 @@ mod tests {
     fn disparity_becomes_metres_and_what_is_unknown_stays_so() {
         let disparity = DisparityMap { width: 6, height: 1, px: vec![5.0, 15.0, 0.0, f32::NAN, f32::INFINITY, 0.01] };
         let mut map = DepthMap::default();
-        metres(&disparity, &RIG, &mut map);
+        disparity_to_depth(&disparity, &RIG, &mut map);
         assert_eq!(map.metres[..5], [1.0, 0.5, 0.0, 0.0, 0.0]);
         assert!((map.metres[5] - 10.0 / 5.01).abs() < 1e-5);
         // Infinity lies at 5 px: disparities up to there are known, and clamped to the largest depth.
-        metres(&disparity, &StereoRig { doffs_px: -5.0, ..RIG }, &mut map);
+        disparity_to_depth(&disparity, &StereoRig { doffs_px: -5.0, ..RIG }, &mut map);
         assert_eq!(map.metres, [160.0, 1.0, 0.0, 0.0, 0.0, 160.0]);
     }
 
@@ -258,7 +261,7 @@ mod tests {
         let disparity = DisparityMap { width: 5, height: 1, px: vec![4.0, 8.0, 16.0, 24.0, 32.0] };
         for rig in [RIG, StereoRig::default_for_width(640), StereoRig { focal_px: 721.5, baseline_m: 0.54, ..RIG }] {
             let mut map = DepthMap::default();
-            metres(&disparity, &rig, &mut map);
+            disparity_to_depth(&disparity, &rig, &mut map);
             let coc = DepthCoc { coc_at_infinity_px: 12.0, focus_m: map.metres[2], range_m: 0.0, max_coc_px: 100.0 };
             let in_focus_px = 16.0 + rig.doffs_px;
             for (&d_px, &z_m) in disparity.px.iter().zip(&map.metres) {
@@ -270,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_rectified_pair_is_matched_as_it_is() {
-        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
+        let mut source = StereoDepth::from_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (color(&[25, 55, 10]), DepthMap::default());
         source.rectify(&mut picture);
         assert_eq!(picture, color(&[25, 55, 10]));
@@ -287,7 +290,7 @@ mod tests {
     #[test]
     fn a_raw_pair_is_rectified_and_so_is_its_picture() {
         let size = (64, 48);
-        let eye = |center_y_px| CameraIntrinsics {
+        let camera = |center_y_px| CameraIntrinsics {
             size: Some(size),
             focal_px: DVec2::splat(60.0),
             center_px: DVec2::new(32.0, center_y_px),
@@ -295,7 +298,7 @@ mod tests {
         };
         // The right camera sees everything some rows further up.
         let calibration = StereoCalibration {
-            cameras: [eye(24.0), eye(20.0)],
+            cameras: [camera(24.0), camera(20.0)],
             rotation: DMat3::IDENTITY,
             translation_m: DVec3::new(-0.1, 0.0, 0.0),
             stored_rectification: None,
@@ -310,7 +313,7 @@ mod tests {
         rectifier.rectify_right(&raw_right, &mut right);
         assert_ne!(left, raw);
 
-        let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);
+        let mut source = StereoDepth::from_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (raw.clone(), DepthMap::default());
         source.rectify(&mut picture);
         assert_eq!(picture, left);
@@ -323,10 +326,10 @@ mod tests {
 
     #[test]
     fn one_eye_and_unequal_eyes_are_named() {
-        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
+        let mut source = StereoDepth::from_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (picture, mut map) = (color(&[25, 55]), DepthMap::default());
         let error = source.read(FrameInput { stamp: STAMP, color: &picture, right: None }, &mut map).unwrap_err();
-        assert!(matches!(&error, DepthError::OneEye { .. }) && error.to_string().contains("two eyes"), "{error}");
+        assert!(matches!(&error, DepthError::MissingRight { .. }) && error.to_string().contains("two eyes"), "{error}");
         let right = gray(&[1, 2, 3]);
         let error =
             source.read(FrameInput { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap_err();

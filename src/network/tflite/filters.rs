@@ -3,7 +3,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::kernels::{Axis, Size, activate, vectors, vectors_mut};
+use super::kernels::{Axis, Size, activate, as_vectors, as_vectors_mut};
 use super::model::Activation;
 use crate::compute::simd::{fma, load};
 
@@ -35,34 +35,34 @@ impl WithSimd for Pointwise<'_> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let blocks = self.bias.len() / S::F32_LANES;
         for block in (0..blocks / 2).map(|pair| 2 * pair) {
-            self.fill_block::<S, TILE_PIXELS_OF_TWO, 2>(simd, block);
+            self.compute_block::<S, TILE_PIXELS_OF_TWO, 2>(simd, block);
         }
         if !blocks.is_multiple_of(2) {
-            self.fill_block::<S, TILE_PIXELS, 1>(simd, blocks - 1);
+            self.compute_block::<S, TILE_PIXELS, 1>(simd, blocks - 1);
         }
     }
 }
 
 impl Pointwise<'_> {
     #[inline(always)]
-    fn fill_block<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
+    fn compute_block<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
         let whole = self.pixels / N * N;
         // Full tiles first, then single pixels.
         for first in (0..whole).step_by(N) {
-            self.fill_tile::<S, N, M>(simd, block, first);
+            self.compute_tile::<S, N, M>(simd, block, first);
         }
         for first in whole..self.pixels {
-            self.fill_tile::<S, 1, M>(simd, block, first);
+            self.compute_tile::<S, 1, M>(simd, block, first);
         }
     }
 
     /// Computes `N` pixels of `M` blocks.
     #[inline(always)]
-    fn fill_tile<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
+    fn compute_tile<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
         let (plane, depth) = (self.pixels * S::F32_LANES, self.input.len() / self.pixels);
         let weights: [&[S::f32s]; M] =
-            std::array::from_fn(|m| &vectors::<S>(self.weights)[(block + m) * depth..][..depth]);
-        let bias: [S::f32s; M] = std::array::from_fn(|m| vectors::<S>(self.bias)[block + m]);
+            std::array::from_fn(|m| &as_vectors::<S>(self.weights)[(block + m) * depth..][..depth]);
+        let bias: [S::f32s; M] = std::array::from_fn(|m| as_vectors::<S>(self.bias)[block + m]);
         let mut sums = [bias; N];
         for (part, input) in self.input.chunks_exact(plane).enumerate() {
             let pixels = &input[first * S::F32_LANES..][..N * S::F32_LANES];
@@ -78,7 +78,7 @@ impl Pointwise<'_> {
         }
         for m in 0..M {
             let out = &mut self.out[(block + m) * self.plane + first * S::F32_LANES..][..N * S::F32_LANES];
-            let out: &mut [S::f32s; N] = vectors_mut::<S>(out).try_into().expect("as many as are made");
+            let out: &mut [S::f32s; N] = as_vectors_mut::<S>(out).try_into().expect("as many as are made");
             for (out, sums) in out.iter_mut().zip(&sums) {
                 *out = activate(simd, self.activation, sums[m]);
             }
@@ -89,7 +89,7 @@ impl Pointwise<'_> {
 /// Unfolds the inputs of one output row (im2col): every tap becomes a channel, so that the filter is a pointwise
 /// convolution. Values of `out` that are never written must be 0 (padding of channels).
 pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, made: &Size, out: &mut [f32]) {
-    let (rows, first_row) = down.inside(row, size.rows);
+    let (rows, first_row) = down.taps_inside(row, size.rows);
     let taps = (0..down.taps).flat_map(|tap| (0..across.taps).map(move |column| (tap, column)));
     for (place, (tap, column)) in taps.enumerate() {
         // The outputs for which this tap is within the picture.
@@ -131,15 +131,15 @@ impl WithSimd for Depthwise<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         match self.axes[1].step {
-            1 => self.along::<S, 1>(simd),
-            _ => self.along::<S, 2>(simd),
+            1 => self.filter_rows::<S, 1>(simd),
+            _ => self.filter_rows::<S, 2>(simd),
         }
     }
 }
 
 impl Depthwise<'_> {
     #[inline(always)]
-    fn along<S: Simd, const STEP: usize>(self, simd: S) {
+    fn filter_rows<S: Simd, const STEP: usize>(self, simd: S) {
         let Self { input, size, axes: [down, across], weights, bias, activation, out, result, lines } = self;
         let line = lines.len() / down.taps;
         let (row_len, taps) = (size.columns * S::F32_LANES, across.taps * S::F32_LANES);
@@ -150,7 +150,7 @@ impl Depthwise<'_> {
             let bias = load::<S>(bias, block * S::F32_LANES);
             let mut rows = input.chunks_exact(row_len).enumerate();
             for (y, out) in out.chunks_exact_mut(result.columns * S::F32_LANES).enumerate() {
-                let (inside, first_row) = down.inside(y, size.rows);
+                let (inside, first_row) = down.taps_inside(y, size.rows);
                 let last = first_row + inside.len();
                 // Read each input row into the ring buffer once, when the first output needs it.
                 let next = rows.by_ref();
@@ -162,7 +162,7 @@ impl Depthwise<'_> {
                 let under = (first_row..)
                     .zip(inside)
                     .map(|(row, tap)| (&lines[row % down.taps * line..][..line], &weights[tap * taps..][..taps]));
-                let out = vectors_mut::<S>(out);
+                let out = as_vectors_mut::<S>(out);
                 let whole = result.columns / ROW_TILE * ROW_TILE;
                 for first in (0..whole).step_by(ROW_TILE) {
                     filter_tile::<S, STEP, ROW_TILE>(simd, under.clone(), bias, activation, first, out);
@@ -187,8 +187,8 @@ fn filter_tile<'a, S: Simd, const STEP: usize, const N: usize>(
 ) {
     let mut sums = [bias; N];
     for (line, weights) in under {
-        let line = &vectors::<S>(line)[first * STEP..];
-        for (tap, weight) in vectors::<S>(weights).iter().enumerate() {
+        let line = &as_vectors::<S>(line)[first * STEP..];
+        for (tap, weight) in as_vectors::<S>(weights).iter().enumerate() {
             let pixels = &line[tap..][..(N - 1) * STEP + 1];
             for (n, sum) in sums.iter_mut().enumerate() {
                 *sum = fma(simd, pixels[n * STEP], *weight, *sum);

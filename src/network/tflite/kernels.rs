@@ -3,7 +3,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::model::{Activation, Steps};
+use super::model::{Activation, Strides};
 use crate::compute::simd::{fma, load};
 
 /// A picture's size and memory layout.
@@ -53,7 +53,7 @@ impl Axis {
     }
 
     /// Returns the taps of output `at` that lie within the picture, and the pixel under the first of them.
-    pub fn inside(&self, at: usize, pixels: usize) -> (std::ops::Range<usize>, usize) {
+    pub fn taps_inside(&self, at: usize, pixels: usize) -> (std::ops::Range<usize>, usize) {
         let first = at * self.step;
         let from = self.padding.saturating_sub(first);
         let to = (pixels + self.padding).saturating_sub(first).min(self.taps);
@@ -61,13 +61,13 @@ impl Axis {
     }
 
     /// Returns the length of a line with padding, for `results` outputs.
-    pub fn line(&self, pixels: usize, results: usize) -> usize {
+    pub fn padded_len(&self, pixels: usize, results: usize) -> usize {
         (self.padding + pixels).max((results - 1) * self.step + self.taps)
     }
 }
 
 /// Returns the axes of a filter over a picture, and the rows and columns of its output.
-pub fn axes(size: &Size, [down, across]: [usize; 2], steps: &Steps) -> Option<([Axis; 2], [usize; 2])> {
+pub fn filter_axes(size: &Size, [down, across]: [usize; 2], steps: &Strides) -> Option<([Axis; 2], [usize; 2])> {
     let (down, rows) = Axis::new(down, steps.down, steps.is_padded, size.rows)?;
     let (across, columns) = Axis::new(across, steps.across, steps.is_padded, size.columns)?;
     Some(([down, across], [rows, columns]))
@@ -75,12 +75,12 @@ pub fn axes(size: &Size, [down, across]: [usize; 2], steps: &Steps) -> Option<([
 
 /// Views values as vectors; there is no remainder, as every picture consists of whole vectors.
 #[inline(always)]
-pub fn vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
+pub fn as_vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
     S::as_simd_f32s(values).0
 }
 
 #[inline(always)]
-pub fn vectors_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
+pub fn as_vectors_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
     S::as_mut_simd_f32s(values).0
 }
 
@@ -109,14 +109,14 @@ impl WithSimd for Logistic<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for value in self.values {
-            *value = 1.0 / (1.0 + exp(-*value));
+            *value = 1.0 / (1.0 + fast_exp(-*value));
         }
     }
 }
 
 /// Computes exp(x) with a relative error of 2e-7: 2^n by the exponent bits, times a Taylor series of the remainder.
 #[inline(always)]
-fn exp(x: f32) -> f32 {
+fn fast_exp(x: f32) -> f32 {
     /// Adding it to a float below 2^22 rounds to an integer, which is then in the low bits.
     const WHOLE: f32 = 12_582_912.0;
     let power = (x * std::f32::consts::LOG2_E).clamp(-126.0, 126.0);
@@ -127,9 +127,9 @@ fn exp(x: f32) -> f32 {
 }
 
 /// Returns the number of channels per vector.
-pub struct Lanes;
+pub struct LaneCount;
 
-impl WithSimd for Lanes {
+impl WithSimd for LaneCount {
     type Output = usize;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> usize {
@@ -155,11 +155,11 @@ impl WithSimd for Elementwise<'_> {
         let Self { a, gate, b, activation, out, plane } = self;
         let one = simd.splat_f32s(1.0);
         for (block, out) in out.chunks_exact_mut(plane).enumerate() {
-            let a = vectors::<S>(&a[block * plane..][..plane]);
+            let a = as_vectors::<S>(&a[block * plane..][..plane]);
             let gate = gate.map_or(one, |gate| load::<S>(gate, block * S::F32_LANES));
-            let out = vectors_mut::<S>(out).iter_mut().zip(a);
+            let out = as_vectors_mut::<S>(out).iter_mut().zip(a);
             match b {
-                Some(b) => out.zip(vectors::<S>(&b[block * plane..][..plane])).for_each(|((out, a), b)| {
+                Some(b) => out.zip(as_vectors::<S>(&b[block * plane..][..plane])).for_each(|((out, a), b)| {
                     *out = activate(simd, activation, fma(simd, *a, gate, *b));
                 }),
                 None => out.for_each(|(out, a)| *out = activate(simd, activation, simd.mul_f32s(*a, gate))),
@@ -181,10 +181,10 @@ impl WithSimd for Mean<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let scale = simd.splat_f32s(S::F32_LANES as f32 / self.plane as f32);
-        for (block, out) in vectors_mut::<S>(self.out).iter_mut().enumerate() {
+        for (block, out) in as_vectors_mut::<S>(self.out).iter_mut().enumerate() {
             let mut sums = [simd.splat_f32s(0.0); 4];
             for values in [Some(self.a), self.b].into_iter().flatten() {
-                for (k, pixel) in vectors::<S>(&values[block * self.plane..][..self.plane]).iter().enumerate() {
+                for (k, pixel) in as_vectors::<S>(&values[block * self.plane..][..self.plane]).iter().enumerate() {
                     sums[k % 4] = simd.add_f32s(sums[k % 4], *pixel);
                 }
             }
@@ -217,12 +217,12 @@ impl WithSimd for Upsample<'_> {
         let between = |near: S::f32s, far: S::f32s| fma(simd, near, three, simd.mul_f32s(far, one));
         for (input, out) in input.chunks_exact(size.plane()).zip(out.chunks_exact_mut(4 * size.plane())) {
             for (y, out) in out.chunks_exact_mut(2 * length).enumerate() {
-                let line = |y: usize| vectors::<S>(&input[y * length..][..length]);
-                let row = vectors_mut::<S>(row);
+                let line = |y: usize| as_vectors::<S>(&input[y * length..][..length]);
+                let row = as_vectors_mut::<S>(row);
                 for ((row, near), far) in row.iter_mut().zip(line(y / 2)).zip(line(beside(y, size.rows))) {
                     *row = between(*near, *far);
                 }
-                for (x, out) in vectors_mut::<S>(out).iter_mut().enumerate() {
+                for (x, out) in as_vectors_mut::<S>(out).iter_mut().enumerate() {
                     *out = between(row[x / 2], row[beside(x, size.columns)]);
                 }
             }

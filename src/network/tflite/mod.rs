@@ -1,6 +1,6 @@
 //! TFLite networks for person segmentation: MobileNet-like, with a single input and ten kinds of operators
-//! ([`model::Kind`]), run on one thread with SIMD. Weights are packed once; memory of intermediate pictures is reused
-//! as soon as it is free.
+//! ([`model::OperatorKind`]), run on one thread with SIMD. Weights are packed once; memory of intermediate pictures is
+//! reused as soon as it is free.
 
 mod filters;
 mod kernels;
@@ -17,7 +17,7 @@ pub use model::is_tflite;
 use self::filters::{Depthwise, Pointwise, im2col_row};
 use self::kernels::{Elementwise, Logistic, Mean, Upsample};
 use self::model::{Activation, Model};
-use self::plan::{Plan, Step, Work};
+use self::plan::{Operation, Plan, Step};
 use super::{Engine, Network, Port, Tensor};
 
 /// A network run by this module.
@@ -40,11 +40,11 @@ impl Tflite {
             vec![Port { name: tensor.name.clone(), shape: tensor.shape.iter().map(|&side| Some(side)).collect() }]
         };
         let (inputs, outputs) = (port(model.input), port(model.output));
-        let engine = Box::new(Self::of(&model)?);
+        let engine = Box::new(Self::from_model(&model)?);
         Ok(Network { engine, inputs, outputs, runtime: "the built-in TFLite runtime".to_owned() })
     }
 
-    fn of(model: &Model) -> Result<Self, String> {
+    fn from_model(model: &Model) -> Result<Self, String> {
         let plan = Plan::new(model)?;
         let slots = plan.slots.iter().map(|&values| vec![0.0; values]).collect();
         Ok(Self { scratch: vec![0.0; plan.scratch], slots, plan, arch: Arch::new() })
@@ -86,11 +86,11 @@ impl Step {
         let input = &slots[self.input][..size.len()];
         let (pixels, plane) = (size.pixels(), result.plane());
         let seen = |slot: &Option<usize>| slot.map(|slot| &slots[slot][..size.len()]);
-        match &self.work {
-            Work::Pointwise { weights, bias, under: None } => {
+        match &self.operation {
+            Operation::Pointwise { weights, bias, under: None } => {
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out, plane });
             }
-            Work::Pointwise { weights, bias, under: Some((axes, under)) } => {
+            Operation::Pointwise { weights, bias, under: Some((axes, under)) } => {
                 let (pixels, row_len) = (under.pixels(), under.plane());
                 let input_row = &mut scratch[..under.len()];
                 input_row.fill(0.0);
@@ -100,11 +100,11 @@ impl Step {
                     arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
                 }
             }
-            Work::Depthwise { weights, bias, axes, lines } => {
+            Operation::Depthwise { weights, bias, axes, lines } => {
                 let (axes, lines) = (*axes, &mut scratch[..*lines]);
                 arch.dispatch(Depthwise { input, size, axes, weights, bias, activation, out, result, lines });
             }
-            Work::TransposedConvolution { weights, bias } => {
+            Operation::TransposedConvolution { weights, bias } => {
                 let (lanes, sums) = (size.lanes, &mut scratch[..pixels * bias.len()]);
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
                 for (y, out) in out.chunks_exact_mut(result.columns).enumerate() {
@@ -115,12 +115,12 @@ impl Step {
                     }
                 }
             }
-            Work::Elementwise { gate, b } => {
+            Operation::Elementwise { gate, b } => {
                 let gate = gate.map(|slot| &slots[slot][..]);
                 arch.dispatch(Elementwise { a: input, gate, b: seen(b), activation, out, plane });
             }
-            Work::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out, plane: size.plane() }),
-            Work::Upsample => {
+            Operation::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out, plane: size.plane() }),
+            Operation::Upsample => {
                 let row = &mut scratch[..size.columns * size.lanes];
                 arch.dispatch(Upsample { input, size, row, out });
             }

@@ -31,7 +31,7 @@ pub enum Activation {
 
 /// A filter's strides, and whether the picture is zero-padded at its edges ("same" padding).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Steps {
+pub struct Strides {
     pub down: usize,
     pub across: usize,
     pub is_padded: bool,
@@ -39,11 +39,11 @@ pub struct Steps {
 
 /// An operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum OperatorKind {
     /// Input, weights `[out, rows, columns, in]`, bias.
-    Convolution(Steps),
+    Convolution(Strides),
     /// Input, weights `[1, rows, columns, channels]`, bias.
-    Depthwise(Steps),
+    Depthwise(Strides),
     /// Input, weights `[out, 2, 2, in]`, bias: transposed convolution with stride 2, each pixel becomes four (a custom
     /// operator of MediaPipe).
     TransposedConvolution,
@@ -60,7 +60,7 @@ pub enum Kind {
 /// An operator, with the indices of its tensors.
 #[derive(Clone, Debug)]
 pub struct Operator {
-    pub kind: Kind,
+    pub kind: OperatorKind,
     pub activation: Activation,
     pub inputs: Vec<usize>,
     pub output: usize,
@@ -85,7 +85,7 @@ impl Model {
     /// Parses a file.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         let root = Table::root(bytes)?;
-        let codes = root.tables(1)?.iter().map(code).collect::<Result<Vec<_>, String>>()?;
+        let codes = root.tables(1)?.iter().map(parse_code).collect::<Result<Vec<_>, String>>()?;
         let buffers = root.tables(4)?;
         let [graph] = root.tables(2)?[..] else { return Err("it does not have exactly one graph".to_owned()) };
         let tables = graph.tables(0)?;
@@ -93,7 +93,8 @@ impl Model {
         if tables.len().max(steps.len()) > MAX_PARTS {
             return Err(format!("it has more than {MAX_PARTS} tensors or operators"));
         }
-        let mut tensors = tables.iter().map(|table| tensor(table, &buffers)).collect::<Result<Vec<_>, String>>()?;
+        let mut tensors =
+            tables.iter().map(|table| parse_tensor(table, &buffers)).collect::<Result<Vec<_>, String>>()?;
         let in_all = tensors.iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum::<usize>();
         if in_all > MAX_TOTAL_VALUES {
             return Err(format!("its tensors have more than {MAX_TOTAL_VALUES} values"));
@@ -106,7 +107,7 @@ impl Model {
             let inputs = step.ints(1)?.into_iter().map(index).collect::<Result<Vec<_>, String>>()?;
             let [output] = step.ints(2)?[..] else { return Err("an operator gives more than one tensor".to_owned()) };
             let output = index(output)?;
-            let Some((kind, activation)) = kind(code, &step)? else {
+            let Some((kind, activation)) = parse_kind(code, &step)? else {
                 // Dequantisation: 16-bit constants become 32-bit ones here.
                 let [from] = inputs[..] else { return Err(TRUNCATED.to_owned()) };
                 let values = tensors[from].constant.take().unwrap_or_default();
@@ -127,12 +128,12 @@ impl Model {
 }
 
 /// Parses an operator code: its number, and its name if it is a custom one.
-fn code(table: &Table<'_>) -> Result<(i32, String), String> {
+fn parse_code(table: &Table<'_>) -> Result<(i32, String), String> {
     let number = i32::from(table.byte(0)?).max(table.int(3)?);
     Ok((number, String::from_utf8_lossy(table.bytes(1)?).into_owned()))
 }
 
-fn tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
+fn parse_tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
     let shape = table.ints(0)?.into_iter().map(|side| usize::try_from(side).map_err(|_| TRUNCATED.to_owned()));
     let shape = shape.collect::<Result<Vec<_>, String>>()?;
     let name = String::from_utf8_lossy(table.bytes(3)?).into_owned();
@@ -153,13 +154,13 @@ fn tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
 }
 
 /// Parses an operator and its activation; `None` if it only converts constants.
-fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, Activation)>, String> {
+fn parse_kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(OperatorKind, Activation)>, String> {
     let options = step.table(4)?;
     let byte = |number: usize| options.map_or(Ok(0), |options| options.byte(number));
     let int = |number: usize| options.map_or(Ok(0), |options| options.int(number));
-    let steps = || -> Result<Steps, String> {
+    let steps = || -> Result<Strides, String> {
         let side = |number: usize| Ok::<_, String>(usize::try_from(int(number)?.max(1)).expect("at least 1"));
-        Ok(Steps { is_padded: byte(0)? == 0, across: side(1)?, down: side(2)? })
+        Ok(Strides { is_padded: byte(0)? == 0, across: side(1)?, down: side(2)? })
     };
     let activation = |number: usize| match byte(number)? {
         0 => Ok(Activation::None),
@@ -167,17 +168,17 @@ fn kind((code, name): &(i32, String), step: &Table<'_>) -> Result<Option<(Kind, 
         other => Err(format!("activation {other} of an operator is not supported")),
     };
     Ok(Some(match code {
-        0 => (Kind::Sum, activation(0)?),
-        3 => (Kind::Convolution(steps()?), activation(3)?),
-        4 => (Kind::Depthwise(steps()?), activation(4)?),
+        0 => (OperatorKind::Sum, activation(0)?),
+        3 => (OperatorKind::Convolution(steps()?), activation(3)?),
+        4 => (OperatorKind::Depthwise(steps()?), activation(4)?),
         6 => return Ok(None),
-        14 => (Kind::Activation(Activation::Logistic), Activation::None),
-        18 => (Kind::Scale, activation(0)?),
-        19 => (Kind::Activation(Activation::Relu), Activation::None),
-        23 if byte(2)? == 0 && byte(3)? != 0 => (Kind::Upsample, Activation::None),
-        32 if name == "Convolution2DTransposeBias" => (Kind::TransposedConvolution, Activation::None),
-        40 => (Kind::Mean, Activation::None),
-        117 => (Kind::Activation(Activation::HardSwish), Activation::None),
+        14 => (OperatorKind::Activation(Activation::Logistic), Activation::None),
+        18 => (OperatorKind::Scale, activation(0)?),
+        19 => (OperatorKind::Activation(Activation::Relu), Activation::None),
+        23 if byte(2)? == 0 && byte(3)? != 0 => (OperatorKind::Upsample, Activation::None),
+        32 if name == "Convolution2DTransposeBias" => (OperatorKind::TransposedConvolution, Activation::None),
+        40 => (OperatorKind::Mean, Activation::None),
+        117 => (OperatorKind::Activation(Activation::HardSwish), Activation::None),
         _ => return Err(format!("operator {code} {name:?} is not supported")),
     }))
 }

@@ -3,11 +3,11 @@
 
 use pulp::Arch;
 
-use super::kernels::{Axis, Lanes, Size, axes};
-use super::model::{Activation, Kind, MAX_TOTAL_VALUES, Model, Operator, Tensor};
+use super::kernels::{Axis, LaneCount, Size, filter_axes};
+use super::model::{Activation, MAX_TOTAL_VALUES, Model, Operator, OperatorKind, Tensor};
 
 /// The operation of a step.
-pub enum Work {
+pub enum Operation {
     /// Pointwise convolution, of the pixels themselves or of an im2col row (`under`).
     Pointwise {
         weights: Vec<f32>,
@@ -39,7 +39,7 @@ pub enum Work {
 
 /// A step, which reads and writes slots.
 pub struct Step {
-    pub work: Work,
+    pub operation: Operation,
     pub activation: Activation,
     pub input: usize,
     pub size: Size,
@@ -70,12 +70,12 @@ struct Allocation {
 struct Planner<'a> {
     model: &'a Model,
     lanes: usize,
-    kept: Vec<Option<Allocation>>,
+    allocations: Vec<Option<Allocation>>,
     free: Vec<usize>,
     plan: Plan,
 }
 
-fn size_of(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, String> {
+fn picture_size(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, String> {
     let [1, rows, columns, channels] = tensor.shape[..] else {
         return Err(format!("{:?} is not a picture: {:?}", tensor.name, tensor.shape));
     };
@@ -88,46 +88,49 @@ fn size_of(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, Stri
 impl Plan {
     /// Creates the plan of a model for this machine.
     pub fn new(model: &Model) -> Result<Self, String> {
-        let input = size_of(&model.tensors[model.input], |channels| channels)?;
+        let input = picture_size(&model.tensors[model.input], |channels| channels)?;
         let plan =
             Self { steps: Vec::new(), slots: vec![input.len()], scratch: 0, input: (0, input), output: (0, input) };
-        let kept = model.tensors.iter().map(|_| None).collect();
-        let lanes = Arch::new().dispatch(Lanes);
-        let mut planner = Planner { model, lanes, kept, free: Vec::new(), plan };
-        planner.kept[model.input] = Some(Allocation { slot: 0, size: input, uses: planner.count_uses(model.input) });
+        let allocations = model.tensors.iter().map(|_| None).collect();
+        let lanes = Arch::new().dispatch(LaneCount);
+        let mut planner = Planner { model, lanes, allocations, free: Vec::new(), plan };
+        planner.allocations[model.input] =
+            Some(Allocation { slot: 0, size: input, uses: planner.count_uses(model.input) });
         let mut operators = model.operators.iter().peekable();
         while let Some(operator) = operators.next() {
             let mut operator = operator.clone();
             // Fuse the next operator if nothing else reads this output.
             while let Some(next) = operators.peek()
                 && planner.count_uses(operator.output) == 1
-                && let Some(both) = fuse(&operator, next)
+                && let Some(both) = fuse_operators(&operator, next)
             {
                 operator = both;
                 operators.next();
             }
-            planner.add(&operator)?;
+            planner.add_step(&operator)?;
         }
-        let output = planner.kept[model.output].take().ok_or("no operator computes its output")?;
+        let output = planner.allocations[model.output].take().ok_or("no operator computes its output")?;
         Ok(Self { output: (output.slot, output.size), ..planner.plan })
     }
 }
 
 /// Fuses two operators into one, if the second reads the output of the first and the combination is supported.
-fn fuse(first: &Operator, second: &Operator) -> Option<Operator> {
+fn fuse_operators(first: &Operator, second: &Operator) -> Option<Operator> {
     let other = |k: usize| second.inputs.get(1 - k).copied().filter(|&other| other != first.output);
     let place = second.inputs.iter().position(|&input| input == first.output)?;
     let mut both = Operator { output: second.output, ..first.clone() };
     match (first.kind, second.kind) {
-        (_, Kind::Activation(activation)) if first.activation == Activation::None && fuses_activation(first.kind) => {
+        (_, OperatorKind::Activation(activation))
+            if first.activation == Activation::None && fuses_activation(first.kind) =>
+        {
             both.activation = activation;
         }
-        (Kind::Scale, Kind::Sum) if first.activation == Activation::None && first.inputs.len() == 2 => {
+        (OperatorKind::Scale, OperatorKind::Sum) if first.activation == Activation::None && first.inputs.len() == 2 => {
             both.inputs.push(other(place)?);
             both.activation = second.activation;
         }
-        (Kind::Sum, Kind::Mean) if first.activation == Activation::None => {
-            both.kind = Kind::Mean;
+        (OperatorKind::Sum, OperatorKind::Mean) if first.activation == Activation::None => {
+            both.kind = OperatorKind::Mean;
         }
         _ => return None,
     }
@@ -135,8 +138,14 @@ fn fuse(first: &Operator, second: &Operator) -> Option<Operator> {
 }
 
 /// Returns whether a step can apply an activation to its result.
-fn fuses_activation(kind: Kind) -> bool {
-    matches!(kind, Kind::Convolution(_) | Kind::Depthwise(_) | Kind::TransposedConvolution | Kind::Sum)
+fn fuses_activation(kind: OperatorKind) -> bool {
+    matches!(
+        kind,
+        OperatorKind::Convolution(_)
+            | OperatorKind::Depthwise(_)
+            | OperatorKind::TransposedConvolution
+            | OperatorKind::Sum
+    )
 }
 
 impl Planner<'_> {
@@ -147,8 +156,9 @@ impl Planner<'_> {
     }
 
     fn find_picture(&self, tensor: usize) -> Result<(usize, Size), String> {
-        let kept = self.kept[tensor].as_ref();
-        kept.map(|kept| (kept.slot, kept.size))
+        let allocation = self.allocations[tensor].as_ref();
+        allocation
+            .map(|allocation| (allocation.slot, allocation.size))
             .ok_or_else(|| format!("{:?} is used before it is computed", self.model.tensors[tensor].name))
     }
 
@@ -164,22 +174,22 @@ impl Planner<'_> {
         }
     }
 
-    fn bias(&self, tensor: usize, channels: usize) -> Result<Vec<f32>, String> {
+    fn padded_bias(&self, tensor: usize, channels: usize) -> Result<Vec<f32>, String> {
         let (values, _) = self.constant(tensor, &[Some(channels)])?;
         let mut bias = values.to_vec();
-        bias.resize(self.padded(channels), 0.0);
+        bias.resize(self.padded_channels(channels), 0.0);
         Ok(bias)
     }
 
     /// Rounds channels up to whole vectors.
-    fn padded(&self, channels: usize) -> usize {
+    fn padded_channels(&self, channels: usize) -> usize {
         channels.next_multiple_of(self.lanes)
     }
 
     /// Packs weights `[out][depth]` for [`super::kernels::Pointwise`].
     fn pack_weights(&self, weights: &[f32], depth: usize) -> Vec<f32> {
-        let (out, all, lanes) = (weights.len() / depth, self.padded(depth), self.lanes);
-        let mut packed = vec![0.0; self.padded(out) * all];
+        let (out, all, lanes) = (weights.len() / depth, self.padded_channels(depth), self.lanes);
+        let mut packed = vec![0.0; self.padded_channels(out) * all];
         for (channel, weights) in weights.chunks_exact(depth).enumerate() {
             for (k, weight) in weights.iter().enumerate() {
                 packed[(channel / lanes * all + k) * lanes + channel % lanes] = *weight;
@@ -203,21 +213,22 @@ impl Planner<'_> {
         }
     }
 
-    fn add(&mut self, operator: &Operator) -> Result<(), String> {
+    fn add_step(&mut self, operator: &Operator) -> Result<(), String> {
         let tensor = &self.model.tensors[operator.output];
         let wrong = || format!("an operator cannot make {:?}: {:?}", tensor.name, tensor.shape);
         let [first, others @ ..] = &operator.inputs[..] else { return Err(wrong()) };
         let (input, size) = self.find_picture(*first)?;
         let lanes = self.lanes;
-        let result = size_of(tensor, |_| if operator.kind == Kind::TransposedConvolution { 1 } else { lanes })?;
+        let result =
+            picture_size(tensor, |_| if operator.kind == OperatorKind::TransposedConvolution { 1 } else { lanes })?;
         let in_vectors = size.lanes == lanes;
         let made = |[rows, columns]: [usize; 2], channels: usize| Size { rows, columns, channels, ..result };
         let like_input = Size { lanes: result.lanes, ..size };
-        let (work, made) = match (operator.kind, others) {
-            (Kind::Convolution(steps), &[weights, bias]) => {
+        let (operation, made) = match (operator.kind, others) {
+            (OperatorKind::Convolution(steps), &[weights, bias]) => {
                 let (weights, shape) = self.constant(weights, &[None, None, None, Some(size.channels)])?;
-                let ([out, down, across], bias) = ([shape[0], shape[1], shape[2]], self.bias(bias, shape[0])?);
-                let (axes, sides) = axes(&size, [down, across], &steps).ok_or_else(wrong)?;
+                let ([out, down, across], bias) = ([shape[0], shape[1], shape[2]], self.padded_bias(bias, shape[0])?);
+                let (axes, sides) = filter_axes(&size, [down, across], &steps).ok_or_else(wrong)?;
                 let depth = down * across * size.channels;
                 let weights = self.pack_weights(weights, depth);
                 let alone = in_vectors && [down, across, steps.down, steps.across] == [1; 4];
@@ -225,59 +236,61 @@ impl Planner<'_> {
                 if !alone {
                     self.reserve_scratch(row.len())?;
                 }
-                (Work::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) }, made(sides, out))
+                (Operation::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) }, made(sides, out))
             }
-            (Kind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
+            (OperatorKind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
                 let (weights, shape) = self.constant(weights, &[Some(1), None, None, Some(size.channels)])?;
                 let taps = shape[1] * shape[2];
-                let (axes, sides) = axes(&size, [shape[1], shape[2]], &steps).ok_or_else(wrong)?;
-                let mut spread = vec![0.0; taps * self.padded(size.channels)];
+                let (axes, sides) = filter_axes(&size, [shape[1], shape[2]], &steps).ok_or_else(wrong)?;
+                let mut spread = vec![0.0; taps * self.padded_channels(size.channels)];
                 for (tap, weights) in weights.chunks_exact(size.channels).enumerate() {
                     for (channel, weight) in weights.iter().enumerate() {
                         spread[(channel / lanes * taps + tap) * lanes + channel % lanes] = *weight;
                     }
                 }
-                let bias = self.bias(bias, size.channels)?;
-                let lines = axes[0].taps * axes[1].line(size.columns, sides[1]) * lanes;
+                let bias = self.padded_bias(bias, size.channels)?;
+                let lines = axes[0].taps * axes[1].padded_len(size.columns, sides[1]) * lanes;
                 self.reserve_scratch(lines)?;
-                (Work::Depthwise { weights: spread, bias, axes, lines }, made(sides, size.channels))
+                (Operation::Depthwise { weights: spread, bias, axes, lines }, made(sides, size.channels))
             }
-            (Kind::TransposedConvolution, &[weights, bias]) if in_vectors => {
+            (OperatorKind::TransposedConvolution, &[weights, bias]) if in_vectors => {
                 let (weights, _) = self.constant(weights, &[Some(1), Some(2), Some(2), Some(size.channels)])?;
                 let (bias, _) = self.constant(bias, &[Some(1)])?;
                 let (mut four, weights) = (vec![bias[0]; 4], self.pack_weights(weights, size.channels));
-                four.resize(self.padded(4), 0.0);
+                four.resize(self.padded_channels(4), 0.0);
                 self.reserve_scratch(size.pixels() * four.len())?;
-                (Work::TransposedConvolution { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
+                (Operation::TransposedConvolution { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
             }
-            (Kind::Activation(_), []) if in_vectors => (Work::Elementwise { gate: None, b: None }, like_input),
-            (Kind::Scale, &[gate, ref b @ ..]) if in_vectors => {
+            (OperatorKind::Activation(_), []) if in_vectors => {
+                (Operation::Elementwise { gate: None, b: None }, like_input)
+            }
+            (OperatorKind::Scale, &[gate, ref b @ ..]) if in_vectors => {
                 let ((gate, gate_size), b) =
                     (self.find_picture(gate)?, b.first().map(|&b| self.find_picture(b)).transpose()?);
                 let is_gate = gate_size == Size { rows: 1, columns: 1, ..size };
                 if !is_gate || b.is_some_and(|(_, b)| b != size) {
                     return Err(wrong());
                 }
-                (Work::Elementwise { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
+                (Operation::Elementwise { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
             }
-            (Kind::Sum, &[b]) if in_vectors => {
+            (OperatorKind::Sum, &[b]) if in_vectors => {
                 let (b, b_size) = self.find_picture(b)?;
                 if b_size != size {
                     return Err(wrong());
                 }
-                (Work::Elementwise { gate: None, b: Some(b) }, like_input)
+                (Operation::Elementwise { gate: None, b: Some(b) }, like_input)
             }
-            (Kind::Mean, others) if in_vectors => {
+            (OperatorKind::Mean, others) if in_vectors => {
                 // The second input is either the axes, or the second summand of a fused sum.
                 let b = others.iter().find_map(|&other| self.find_picture(other).ok());
                 if b.is_some_and(|(_, b)| b != size) {
                     return Err(wrong());
                 }
-                (Work::Mean { b: b.map(|(slot, _)| slot) }, Size { rows: 1, columns: 1, ..size })
+                (Operation::Mean { b: b.map(|(slot, _)| slot) }, Size { rows: 1, columns: 1, ..size })
             }
-            (Kind::Upsample, _) if in_vectors => {
+            (OperatorKind::Upsample, _) if in_vectors => {
                 self.reserve_scratch(size.columns * lanes)?;
-                (Work::Upsample, made([2 * size.rows, 2 * size.columns], size.channels))
+                (Operation::Upsample, made([2 * size.rows, 2 * size.columns], size.channels))
             }
             _ => return Err(wrong()),
         };
@@ -285,16 +298,16 @@ impl Planner<'_> {
             return Err(wrong());
         }
         let activation = match operator.kind {
-            Kind::Activation(activation) => activation,
+            OperatorKind::Activation(activation) => activation,
             _ => operator.activation,
         };
         let output = self.allocate_slot(result.len());
         self.check_memory()?;
-        self.plan.steps.push(Step { work, activation, input, size, output, result });
+        self.plan.steps.push(Step { operation, activation, input, size, output, result });
         for &tensor in &operator.inputs {
-            self.release(tensor);
+            self.release_use(tensor);
         }
-        self.kept[operator.output] =
+        self.allocations[operator.output] =
             Some(Allocation { slot: output, size: result, uses: self.count_uses(operator.output) });
         Ok(())
     }
@@ -317,12 +330,12 @@ impl Planner<'_> {
         }
     }
 
-    fn release(&mut self, tensor: usize) {
-        if let Some(kept) = &mut self.kept[tensor] {
-            kept.uses -= 1;
-            if kept.uses == 0 {
-                self.free.push(kept.slot);
-                self.kept[tensor] = None;
+    fn release_use(&mut self, tensor: usize) {
+        if let Some(allocation) = &mut self.allocations[tensor] {
+            allocation.uses -= 1;
+            if allocation.uses == 0 {
+                self.free.push(allocation.slot);
+                self.allocations[tensor] = None;
             }
         }
     }

@@ -30,7 +30,7 @@ impl<'a> Table<'a> {
     }
 
     /// Returns the position of a field; `None` if it is absent.
-    fn field(&self, number: usize) -> Result<Option<usize>, String> {
+    fn field_position(&self, number: usize) -> Result<Option<usize>, String> {
         let back = i32::from_le_bytes(bytes_at(self.bytes, self.at)?);
         let fields = self.at.checked_add_signed(-(back as isize)).ok_or(TRUNCATED)?;
         let size = u16::from_le_bytes(bytes_at(self.bytes, fields)?) as usize;
@@ -44,19 +44,19 @@ impl<'a> Table<'a> {
 
     /// Reads a field of one byte; 0 if absent.
     pub fn byte(&self, number: usize) -> Result<i8, String> {
-        let at = self.field(number)?;
+        let at = self.field_position(number)?;
         at.map_or(Ok(0), |at| Ok(i8::from_le_bytes(bytes_at(self.bytes, at)?)))
     }
 
     /// Reads a field of four bytes; 0 if absent.
     pub fn int(&self, number: usize) -> Result<i32, String> {
-        let at = self.field(number)?;
+        let at = self.field_position(number)?;
         at.map_or(Ok(0), |at| Ok(i32::from_le_bytes(bytes_at(self.bytes, at)?)))
     }
 
     /// Returns position and number of a vector's elements, which have `size` bytes.
-    fn vector(&self, number: usize, size: usize) -> Result<(usize, usize), String> {
-        let Some(at) = self.field(number)? else { return Ok((0, 0)) };
+    fn vector_position(&self, number: usize, size: usize) -> Result<(usize, usize), String> {
+        let Some(at) = self.field_position(number)? else { return Ok((0, 0)) };
         let at = follow_offset(self.bytes, at)?;
         let count = u32::from_le_bytes(bytes_at(self.bytes, at)?) as usize;
         let first = at + 4;
@@ -66,25 +66,25 @@ impl<'a> Table<'a> {
 
     /// Reads a vector of bytes; empty if absent.
     pub fn bytes(&self, number: usize) -> Result<&'a [u8], String> {
-        let (first, count) = self.vector(number, 1)?;
+        let (first, count) = self.vector_position(number, 1)?;
         Ok(&self.bytes[first..first + count])
     }
 
     /// Reads a vector of integers.
     pub fn ints(&self, number: usize) -> Result<Vec<i32>, String> {
-        let (first, count) = self.vector(number, 4)?;
+        let (first, count) = self.vector_position(number, 4)?;
         Ok(self.bytes[first..first + 4 * count].as_chunks().0.iter().map(|four| i32::from_le_bytes(*four)).collect())
     }
 
     /// Reads a table; `None` if absent.
     pub fn table(&self, number: usize) -> Result<Option<Self>, String> {
-        let at = self.field(number)?;
+        let at = self.field_position(number)?;
         at.map(|at| Ok(Self { bytes: self.bytes, at: follow_offset(self.bytes, at)? })).transpose()
     }
 
     /// Reads a vector of tables.
     pub fn tables(&self, number: usize) -> Result<Vec<Self>, String> {
-        let (first, count) = self.vector(number, 4)?;
+        let (first, count) = self.vector_position(number, 4)?;
         let table = |k: usize| Ok(Self { bytes: self.bytes, at: follow_offset(self.bytes, first + 4 * k)? });
         (0..count).map(table).collect()
     }

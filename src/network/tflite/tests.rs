@@ -1,11 +1,11 @@
-use super::model::{Activation, Kind, Model, Operator, Steps, Tensor as Part};
+use super::model::{Activation, Model, Operator, OperatorKind, Strides, Tensor as Part};
 use super::*;
 
 mod file;
 mod reference;
 
 use file::{Value, table_file};
-use reference::reference;
+use reference::run_reference;
 
 /// Returns pseudo-random numbers between -1 and 1.
 fn noise(seed: &mut u32, count: usize) -> Vec<f32> {
@@ -39,7 +39,7 @@ impl Builder {
     }
 
     /// Adds an operator on these tensors with an output of this shape; returns the output's index.
-    fn add(&mut self, kind: Kind, activation: Activation, inputs: &[usize], shape: [usize; 4]) -> usize {
+    fn add(&mut self, kind: OperatorKind, activation: Activation, inputs: &[usize], shape: [usize; 4]) -> usize {
         let Model { tensors, operators, output, .. } = &mut self.model;
         tensors.push(Part { name: "p".into(), shape: shape.to_vec(), constant: None });
         *output = tensors.len() - 1;
@@ -47,7 +47,7 @@ impl Builder {
         *output
     }
 
-    fn filter(&mut self, out: Option<usize>, taps: [usize; 2], steps: Steps, activation: Activation) -> usize {
+    fn filter(&mut self, out: Option<usize>, taps: [usize; 2], steps: Strides, activation: Activation) -> usize {
         let [_, rows, columns, channels] = self.shape();
         let count = |pixels: usize, taps: usize, step: usize| match steps.is_padded {
             true => pixels.div_ceil(step),
@@ -55,8 +55,8 @@ impl Builder {
         };
         let sides = [count(rows, taps[0], steps.down), count(columns, taps[1], steps.across)];
         let (kind, shape) = match out {
-            Some(out) => (Kind::Convolution(steps), [out, taps[0], taps[1], channels]),
-            None => (Kind::Depthwise(steps), [1, taps[0], taps[1], channels]),
+            Some(out) => (OperatorKind::Convolution(steps), [out, taps[0], taps[1], channels]),
+            None => (OperatorKind::Depthwise(steps), [1, taps[0], taps[1], channels]),
         };
         let out = out.unwrap_or(channels);
         let inputs = [self.model.output, self.constant(&shape), self.constant(&[out])];
@@ -66,9 +66,9 @@ impl Builder {
     fn check(mut self) {
         let shape = self.model.tensors[0].shape.clone();
         let values = noise(&mut self.seed, shape.iter().product());
-        let wanted = reference(&self.model, &values);
+        let wanted = run_reference(&self.model, &values);
         let mut outputs = Vec::new();
-        let mut network = Tflite::of(&self.model).unwrap();
+        let mut network = Tflite::from_model(&self.model).unwrap();
         // Twice, so that remains of the first run would show in the second.
         for _ in 0..2 {
             network.run(&[Tensor { shape: shape.clone(), values: values.clone() }], &mut outputs).unwrap();
@@ -82,12 +82,12 @@ impl Builder {
     }
 }
 
-const ONE: Steps = Steps { down: 1, across: 1, is_padded: true };
-const TWO: Steps = Steps { down: 2, across: 2, is_padded: true };
-const FIRST: (Option<usize>, [usize; 2], Steps) = (Some(21), [3, 3], TWO);
+const ONE: Strides = Strides { down: 1, across: 1, is_padded: true };
+const TWO: Strides = Strides { down: 2, across: 2, is_padded: true };
+const FIRST: (Option<usize>, [usize; 2], Strides) = (Some(21), [3, 3], TWO);
 
 /// Returns a network with a first layer like those for pictures.
-fn begun(rows: usize, columns: usize) -> Builder {
+fn with_first_layer(rows: usize, columns: usize) -> Builder {
     let mut net = Builder::new([1, rows, columns, 3]);
     net.filter(FIRST.0, FIRST.1, FIRST.2, Activation::HardSwish);
     net
@@ -95,8 +95,8 @@ fn begun(rows: usize, columns: usize) -> Builder {
 
 #[test]
 fn a_filter_is_the_sum_of_what_lies_under_it() {
-    let within = Steps { is_padded: false, ..ONE };
-    let skewed = Steps { down: 3, across: 2, is_padded: true };
+    let within = Strides { is_padded: false, ..ONE };
+    let skewed = Strides { down: 3, across: 2, is_padded: true };
     for (taps, steps) in [([3, 3], TWO), ([1, 1], ONE), ([5, 2], skewed), ([3, 4], within), ([1, 1], TWO)] {
         for (rows, columns) in [(13, 29), (8, 24), (5, 4)] {
             let mut net = Builder::new([1, rows, columns, 3]);
@@ -109,9 +109,9 @@ fn a_filter_is_the_sum_of_what_lies_under_it() {
 #[test]
 fn sums_over_channels_of_any_number_and_filters_of_each() {
     for (channels, taps, steps) in
-        [(1, [3, 3], ONE), (24, [5, 5], TWO), (88, [3, 3], TWO), (7, [5, 3], Steps { is_padded: false, ..ONE })]
+        [(1, [3, 3], ONE), (24, [5, 5], TWO), (88, [3, 3], TWO), (7, [5, 3], Strides { is_padded: false, ..ONE })]
     {
-        let mut net = begun(14, 50);
+        let mut net = with_first_layer(14, 50);
         net.filter(Some(channels), [1, 1], ONE, Activation::HardSwish);
         net.filter(None, taps, steps, Activation::Relu);
         net.filter(Some(5), [3, 3], ONE, Activation::None);
@@ -121,42 +121,47 @@ fn sums_over_channels_of_any_number_and_filters_of_each() {
 
 #[test]
 fn gates_sums_means_and_enlargements() {
-    let mut net = begun(12, 40);
+    let mut net = with_first_layer(12, 40);
     let trunk = net.model.output;
     let [_, rows, columns, channels] = net.shape();
-    net.add(Kind::Mean, Activation::None, &[trunk], [1, 1, 1, channels]);
+    net.add(OperatorKind::Mean, Activation::None, &[trunk], [1, 1, 1, channels]);
     net.filter(Some(4), [1, 1], ONE, Activation::Relu);
     let squeezed = net.filter(Some(channels), [1, 1], ONE, Activation::None);
-    let gate = net.add(Kind::Activation(Activation::Logistic), Activation::None, &[squeezed], [1, 1, 1, channels]);
-    let gated = net.add(Kind::Scale, Activation::None, &[trunk, gate], [1, rows, columns, channels]);
-    let sum = net.add(Kind::Sum, Activation::Relu, &[gated, trunk], [1, rows, columns, channels]);
-    let both = net.add(Kind::Sum, Activation::None, &[sum, trunk], [1, rows, columns, channels]);
-    net.add(Kind::Mean, Activation::None, &[both], [1, 1, 1, channels]);
+    let gate =
+        net.add(OperatorKind::Activation(Activation::Logistic), Activation::None, &[squeezed], [1, 1, 1, channels]);
+    let gated = net.add(OperatorKind::Scale, Activation::None, &[trunk, gate], [1, rows, columns, channels]);
+    let sum = net.add(OperatorKind::Sum, Activation::Relu, &[gated, trunk], [1, rows, columns, channels]);
+    let both = net.add(OperatorKind::Sum, Activation::None, &[sum, trunk], [1, rows, columns, channels]);
+    net.add(OperatorKind::Mean, Activation::None, &[both], [1, 1, 1, channels]);
     let second = net.filter(Some(channels), [1, 1], ONE, Activation::Logistic);
-    let scaled = net.add(Kind::Scale, Activation::None, &[sum, second], [1, rows, columns, channels]);
-    let wide = net.add(Kind::Upsample, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
+    let scaled = net.add(OperatorKind::Scale, Activation::None, &[sum, second], [1, rows, columns, channels]);
+    let wide = net.add(OperatorKind::Upsample, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
     let (weights, bias) = (net.constant(&[1, 2, 2, channels]), net.constant(&[1]));
-    let mask =
-        net.add(Kind::TransposedConvolution, Activation::None, &[wide, weights, bias], [1, 4 * rows, 4 * columns, 1]);
-    net.add(Kind::Activation(Activation::Logistic), Activation::None, &[mask], [1, 4 * rows, 4 * columns, 1]);
+    let mask = net.add(
+        OperatorKind::TransposedConvolution,
+        Activation::None,
+        &[wide, weights, bias],
+        [1, 4 * rows, 4 * columns, 1],
+    );
+    net.add(OperatorKind::Activation(Activation::Logistic), Activation::None, &[mask], [1, 4 * rows, 4 * columns, 1]);
     net.check();
 }
 
 #[test]
 fn what_does_not_fit_together_is_refused() {
     let refused = |change: fn(&mut Model)| {
-        let mut net = begun(12, 40);
+        let mut net = with_first_layer(12, 40);
         net.filter(None, [3, 3], ONE, Activation::None);
         change(&mut net.model);
-        Tflite::of(&net.model).err().expect("refused")
+        Tflite::from_model(&net.model).err().expect("refused")
     };
     refused(|model| model.tensors[model.output].shape[1] += 1);
     refused(|model| model.tensors[model.output].shape.truncate(3));
     refused(|model| model.tensors[0].shape[3] = 4);
     refused(|model| model.operators.reverse());
     refused(|model| model.operators[1].inputs.truncate(1));
-    refused(|model| model.operators[1].kind = Kind::Depthwise(Steps { across: 3, ..ONE }));
-    refused(|model| model.operators[0].kind = Kind::Sum);
+    refused(|model| model.operators[1].kind = OperatorKind::Depthwise(Strides { across: 3, ..ONE }));
+    refused(|model| model.operators[0].kind = OperatorKind::Sum);
     // Sizes that exceed the memory limit.
     refused(|model| {
         model.tensors[0].shape = vec![1, 1 << 20, 1 << 20, 3];

@@ -9,7 +9,7 @@ use clap::{Args, Subcommand};
 use crate::error::CliError;
 use crate::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::{input, whole};
-use bokehcam::network::{self, KNOWN, Known};
+use bokehcam::network::{self, KNOWN_NETWORKS, KnownNetwork};
 
 /// List the networks that find depth in pictures of a single camera, and install them
 #[derive(Args, Debug)]
@@ -57,12 +57,12 @@ pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
 }
 
 fn format_list() -> String {
-    let installed = network::installed();
+    let installed = network::installed_networks();
     let mut text = String::from("known networks, the best of each task first:\n");
-    for known in &KNOWN {
+    for known in &KNOWN_NETWORKS {
         let place = installed.iter().find(|(other, _)| std::ptr::eq(*other, known));
         let place = place.map_or("not installed".to_owned(), |(_, at)| at.display().to_string());
-        let Known { file, task, license, address, sha256, bytes, .. } = known;
+        let KnownNetwork { file, task, license, address, sha256, bytes, .. } = known;
         let kilobytes = bytes.div_ceil(1000);
         text += &format!(
             "\n{file}\n  for      --depth {task}: {}\n  here     {place}\n  licence  {license}\n  get      {address}\n  file     \
@@ -71,9 +71,9 @@ fn format_list() -> String {
             task = task.name(),
         );
     }
-    let folders: Vec<String> = network::folders().iter().map(|folder| folder.display().to_string()).collect();
+    let folders: Vec<String> = network::model_folders().iter().map(|folder| folder.display().to_string()).collect();
     text += &format!("\nlooked for in {}\n", folders.join(", "));
-    match network::onnx_runtime_installed() {
+    match network::onnx_runtime_version() {
         Ok(name) => text += &format!(".tflite runs on the built-in runtime, .onnx on {name}\n"),
         Err(why) => {
             text += &format!(
@@ -90,7 +90,7 @@ fn add_file(file: &Path) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
     let bytes = input::read(file, network::MAX_BYTES).map_err(io_error(file))?;
-    let known = Known::of(&bytes).ok_or_else(|| {
+    let known = KnownNetwork::identify(&bytes).ok_or_else(|| {
         let what = "it is not a known network (`bokehcam models` lists them), or is incomplete; your own network needs \
                     no installation: use --depth matte:FILE or mono:FILE";
         io_error(file)(io::Error::new(io::ErrorKind::InvalidData, what))
@@ -104,9 +104,9 @@ fn io_error(path: &Path) -> impl FnOnce(io::Error) -> CliError {
 }
 
 /// Writes a network into this user's folder; an existing file is kept.
-fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
+fn install(known: &KnownNetwork, bytes: &[u8]) -> Result<(), CliError> {
     let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
-    let folder = network::folders().into_iter().next().ok_or_else(no_home)?;
+    let folder = network::model_folders().into_iter().next().ok_or_else(no_home)?;
     let target = folder.join(known.file);
     std::fs::create_dir_all(&folder).map_err(io_error(&folder))?;
     match input::read(&target, network::MAX_BYTES) {
@@ -127,16 +127,17 @@ fn install(known: &Known, bytes: &[u8]) -> Result<(), CliError> {
 /// Downloads a known network and installs it.
 fn fetch(name: Option<&str>) -> Result<(), CliError> {
     let unknown = |name: &str| {
-        let names: Vec<&str> = KNOWN.iter().map(|known| known.file).collect();
+        let names: Vec<&str> = KNOWN_NETWORKS.iter().map(|known| known.file).collect();
         CliError::Usage(format!("there is no network {name:?}: use one of {}", names.join(", ")))
     };
-    let known = name.map_or(Ok(&KNOWN[0]), |name| Known::named(name).ok_or_else(|| unknown(name)))?;
-    if let Some((_, file)) = network::installed().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
+    let known =
+        name.map_or(Ok(&KNOWN_NETWORKS[0]), |name| KnownNetwork::find_by_name(name).ok_or_else(|| unknown(name)))?;
+    if let Some((_, file)) = network::installed_networks().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
         print_to_stderr(&format!("{}: installed already, as {}", known.file, file.display()));
         return Ok(());
     }
     let bytes = download(known)?;
-    let is_whole = Known::of(&bytes).is_some_and(|found| std::ptr::eq(found, known));
+    let is_whole = KnownNetwork::identify(&bytes).is_some_and(|found| std::ptr::eq(found, known));
     if !is_whole {
         let what =
             format!("the download is not {}, and was discarded: {} bytes of {}", known.file, bytes.len(), known.bytes);
@@ -146,7 +147,7 @@ fn fetch(name: Option<&str>) -> Result<(), CliError> {
 }
 
 /// Downloads a network from its address; at most one byte more than its known size, to detect a longer file.
-fn download(known: &Known) -> Result<Vec<u8>, CliError> {
+fn download(known: &KnownNetwork) -> Result<Vec<u8>, CliError> {
     const CLIENTS: [(&str, &[&str]); 2] = [
         ("curl", &["--fail", "--location", "--silent", "--show-error", "--proto", "=https", "--max-time", "300"]),
         ("wget", &["--https-only", "--no-verbose", "--timeout=60", "--output-document=-"]),

@@ -65,10 +65,10 @@ fn quarter(map: &DepthMap) -> DepthMap {
 #[test]
 fn it_is_seen_how_outlines_lie() {
     let (color, map) = portrait();
-    assert_eq!(EdgeAlignment::measure(&map, &color), EdgeAlignment::Meets);
+    assert_eq!(EdgeAlignment::measure(&map, &color), EdgeAlignment::Aligned);
     for reach in [4, 8] {
         let found = EdgeAlignment::measure(&fat(&map, reach), &color);
-        let EdgeAlignment::Beside { distance_px } = found else { panic!("fat by {reach} px: {found:?}") };
+        let EdgeAlignment::Shifted { distance_px } = found else { panic!("fat by {reach} px: {found:?}") };
         assert!((distance_px + reach as i32).abs() <= 1, "fat by {reach} px: {distance_px}");
     }
     let found = EdgeAlignment::measure(&soft(&map, 4), &color);

@@ -235,7 +235,7 @@ fn pairs_are_matched_whatever_becomes_of_the_device() {
         let mut matcher = stereo::create(&settings, backend, None).unwrap();
         let mut map = DisparityMap::default();
         for _ in 0..rounds {
-            matcher.disparity(Pair { left: &left, color: None, right: &right }, &mut map).expect("a match");
+            matcher.compute_disparity(Pair { left: &left, color: None, right: &right }, &mut map).expect("a match");
         }
         (map.px, matcher.describe())
     };

@@ -7,9 +7,9 @@ use bokehcam::bokeh::{self, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::BackgroundMemory;
-use bokehcam::depth::fill::Filler;
+use bokehcam::depth::fill::HoleFiller;
 use bokehcam::depth::matting::{self, Matting};
-use bokehcam::depth::misfit::Misalignment;
+use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::depth::refine::{MapCorrection, Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
@@ -124,7 +124,7 @@ impl Shot {
 pub struct Blurrer {
     method: Method,
     bokeh: Option<Box<dyn Bokeh>>,
-    filler: Filler,
+    filler: HoleFiller,
     refiner: Refiner,
     mending: MapCorrection,
     matting: Matting,
@@ -165,7 +165,7 @@ impl Blurrer {
     }
 
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
-        let (filler, refiner) = (Filler::new(), Refiner::new());
+        let (filler, refiner) = (HoleFiller::new(), Refiner::new());
         let (matting, background) = (Matting::default(), BackgroundMemory::default());
         let mending = MapCorrection::default();
         Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
@@ -203,7 +203,7 @@ impl Blurrer {
             Method::Refined => {
                 let mut depth = shot.depth.clone();
                 let mending = Misalignment::measure(&depth, &shot.image)
-                    .and_then(|misfit| misfit.correction(&depth, &shot.image));
+                    .and_then(|misalignment| misalignment.correction(&depth, &shot.image));
                 let mending = mending.unwrap_or_default();
                 if self.mending != mending {
                     (self.mending, self.refiner) = (mending, Refiner::with_correction(mending));

@@ -166,7 +166,7 @@ fn plate(staged: &Staged) -> ColorImage {
 /// Returns a known network for a task.
 fn model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
-    data.and_then(|data| network::best_in(vec![data.join("models")], task)).or_else(|| network::best(task))
+    data.and_then(|data| network::find_best_in(vec![data.join("models")], task)).or_else(|| network::find_best(task))
 }
 
 fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {

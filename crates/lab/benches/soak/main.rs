@@ -25,7 +25,7 @@ use bokehcam::bokeh::{Backend, Bokeh, BokehError};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::ComputeOptions;
-use bokehcam::depth::recorded::Recorded;
+use bokehcam::depth::recorded::RecordedDepth;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
 use bokehcam::pipeline::{self, BlurSetup, Pace, Run};
@@ -187,7 +187,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     let clock = Clock::system();
     let stamps = Stamps::with_room_for(frames as usize);
     let stop = AtomicBool::new(false);
-    let depth = Box::new(Recorded::new(Arc::clone(&recording), &name)?);
+    let depth = Box::new(RecordedDepth::new(Arc::clone(&recording), &name)?);
     let camera = Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone()));
     let sink = Box::new(Stamping::new(clock.clone(), stamps.clone()));
     let report = pipeline::run(Run {

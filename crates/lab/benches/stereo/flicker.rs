@@ -98,7 +98,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         }
         let mut map = DisparityMap::default();
         let [left, right] = frame.gray();
-        matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
+        matcher.compute_disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
         let mut depth = metres(&map, &sequence.rig);
         refiner.set_focus(focus.focus_m(&depth, frame.time_ns));
         refiner.refine(&mut depth, &frame.left, frame.time_ns);
@@ -113,7 +113,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
 /// Converts a disparity map to depth, in a stream's way.
 pub fn metres(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
     let mut depth = DepthMap::default();
-    source::metres(map, rig, &mut depth);
+    source::disparity_to_depth(map, rig, &mut depth);
     depth
 }
 

@@ -52,7 +52,7 @@ pub fn run(picture: &Picture, options: &Options) -> Outcome {
         let mut maps = Vec::new();
         for frame in &sequence.frames {
             let ([left, right], mut map) = (frame.gray(), DisparityMap::default());
-            matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
+            matcher.compute_disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
             maps.push(metres(&map, &sequence.rig));
         }
         sources.push((format!("ours {}", name(effort)), maps));

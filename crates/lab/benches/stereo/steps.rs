@@ -43,7 +43,7 @@ pub fn run(out: &Path, options: &Options) -> Outcome {
         let (mut refiner, mut map) = (Refiner::new(), DisparityMap::default());
         for (index, frame) in sequence.frames.iter().enumerate().take(FRAME + 1) {
             let [left, right] = frame.gray();
-            matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
+            matcher.compute_disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
             let mut depth = metres(&map, &sequence.rig);
             refiner.refine(&mut depth, &frame.left, frame.time_ns);
             if index < FRAME {

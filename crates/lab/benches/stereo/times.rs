@@ -68,7 +68,7 @@ fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Opt
     let mut map = DisparityMap::default();
     let mut turn = |matcher: &mut dyn Matcher| -> Outcome<f64> {
         let began = Instant::now();
-        matcher.disparity(Pair { left: &pair[0], color: None, right: &pair[1] }, &mut map)?;
+        matcher.compute_disparity(Pair { left: &pair[0], color: None, right: &pair[1] }, &mut map)?;
         Ok(1e3 * began.elapsed().as_secs_f64())
     };
     for round in 0..=times.rounds {

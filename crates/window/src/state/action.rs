@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{Camera, DepthMethod, Output, Shown, Source};
 use crate::services::Browse;
 use bokehcam::camera_control::CameraControl;
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
 use bokehcam::source::devices::Choice;
@@ -173,7 +173,7 @@ pub enum Update {
     /// An offered source is valid, and is to be opened.
     Offered(String),
     /// The user chose another background.
-    Behind(Behind),
+    Behind(Background),
     /// Active outputs: sent after each start or stop, including failed ones.
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.

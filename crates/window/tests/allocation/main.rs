@@ -223,7 +223,7 @@ fn two_eyes() {
     let rectifier = Rectifier::new(&calibration, size).expect("maps");
     let settings = stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 };
     let matcher = stereo::create(&settings, Backend::Cpu, None).expect("a matcher");
-    let mut depth = StereoDepth::of_raw("two eyes", rectifier, matcher, 16);
+    let mut depth = StereoDepth::from_raw("two eyes", rectifier, matcher, 16);
     let (raw, mut right, mut map) = (noise(size.0, size.1), GrayImage::default(), DepthMap::default());
     right.set_luma_from(&raw);
     let mut color = raw.clone();

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use bokehcam::computing::ComputeOptions;
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::engine::Images;
 use bokehcam::engine::still::{self as engine_still, Depth};
@@ -55,7 +55,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
     let looks = [
         Look { strength: Strength::AtInfinity(4.0), ..look() },
         Look { strength: Strength::AtInfinity(4.0), focus: FocusRule::Metres(0.9), ..look() },
-        Look { background: Behind::Color(GREEN), ..look() },
+        Look { background: Background::Color(GREEN), ..look() },
         Look { effect: Effect::Blur, ..look() },
     ];
     let mut last = 0;
@@ -83,14 +83,14 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
 fn what_stood_behind_a_frame_that_stays_is_taken_away_again() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
-    watched.session.send(Request::Look(Box::new(Look { background: Behind::Color(GREEN), ..look() })));
+    watched.session.send(Request::Look(Box::new(Look { background: Background::Color(GREEN), ..look() })));
     let is_green = |picture: &ColorImage| picture.rgb.as_chunks().0.contains(&GREEN);
     let view = watched.frame("a green one", |view| is_green(view.picture.memory().unwrap()));
     assert!(!is_green(view.color.as_deref().unwrap()), "the picture as the camera gave it");
     hold(&watched, &view);
     assert!(!is_green(&in_look(&mut watched, &look()).images.blurred));
     let other = [200, 0, 99];
-    let blurred = in_look(&mut watched, &Look { background: Behind::Color(other), ..look() });
+    let blurred = in_look(&mut watched, &Look { background: Background::Color(other), ..look() });
     assert!(blurred.images.blurred.rgb.as_chunks().0.contains(&other) && !is_green(&blurred.images.blurred));
 }
 

@@ -7,7 +7,7 @@ use pulp::Simd;
 
 use super::{CELL_PX, Cluster, FRINGE, FrameView, Sums};
 use crate::compute::simd::load;
-use crate::depth::bits::set_bits;
+use crate::depth::bitmap::set_bits;
 use crate::depth::matting::symmetric::outer_product;
 use crate::frame::DepthMap;
 
@@ -115,7 +115,7 @@ pub fn cluster_cell<S: Simd>(simd: S, view: &FrameView, column: usize, row: usiz
         values[..across].copy_from_slice(metres);
         values[across..].fill(metres[across - 1]);
         let missing = if k < down { ROW & !0 << across } else { ROW };
-        edges |= (at_edge.word_from(left, y) & ROW & !missing) << (k * CELL_PX);
+        edges |= (at_edge.word_at(left, y) & ROW & !missing) << (k * CELL_PX);
         beyond |= missing << (k * CELL_PX);
     }
     for value in &mut values {
@@ -200,7 +200,7 @@ fn pixels_near_edges(view: &FrameView, left: usize, top: usize) -> u64 {
     for (k, row) in rows.iter_mut().enumerate() {
         let y = top + k;
         if (CLOSE_PX..view.size.1 + CLOSE_PX).contains(&y) {
-            let edges = view.at_edge.word_from(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
+            let edges = view.at_edge.word_at(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
             // Bit 0, column `left` of the cell, covers the first `2 CLOSE_PX + 1` columns.
             for by in 0..=2 * CLOSE_PX {
                 *row |= edges >> by;

@@ -203,7 +203,7 @@ impl Resources {
             map_size: [self.map_size.0, self.map_size.1],
             focus_m,
             rescale: last.map_or(1.0, |(_, before_m)| focus_m / before_m),
-            max_hole_px: guided_fill::longest(color.width as usize) as u32,
+            max_hole_px: guided_fill::max_hole_px(color.width as usize) as u32,
             is_empty: is_empty.into(),
             is_fresh: last.is_none().into(),
             ..Frame::default()

@@ -12,7 +12,7 @@ use super::super::votes::{
 };
 use super::super::{CHANGE_SIGMAS, DEPTH_STEP_SIGMAS, MIN_CHANGE, MIN_DEPTH_STEP, upsample};
 use crate::compute::device::{Shader, shader};
-use crate::depth::guided_fill::{self, FOLLOW, PREFERENCE, SAMPLE_PX};
+use crate::depth::guided_fill::{self, COLOR_PREFERENCE, COLOR_UPDATE_RATE, SAMPLE_PX};
 use crate::frame::DepthMap;
 
 /// Resampling of the map, and packing of the picture.
@@ -73,8 +73,8 @@ pub fn constants(again: bool) -> [(&'static str, f64); 36] {
         ("MAP_SURFACE", upsample::SAME_SURFACE.into()),
         ("HOLE_SURFACE", guided_fill::SAME_SURFACE.into()),
         ("SAMPLE_PX", SAMPLE_PX as f64),
-        ("PREFERENCE", PREFERENCE.into()),
-        ("FOLLOW", FOLLOW.into()),
+        ("COLOR_PREFERENCE", COLOR_PREFERENCE.into()),
+        ("COLOR_UPDATE_RATE", COLOR_UPDATE_RATE.into()),
         ("LAG_PX", LAG_PX as f64),
         ("NOISE_GRID", noise::GRID as f64),
         ("SMOOTH_FRACTION", SMOOTH_FRACTION.into()),

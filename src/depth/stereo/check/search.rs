@@ -10,9 +10,9 @@ const SEARCH_ROWS: i32 = 12;
 /// Side of the squares of which each yields one point, in pixels at half resolution.
 const CELL: usize = 16;
 /// Side of the compared windows at half resolution.
-const COARSE: usize = 8;
+const COARSE_WINDOW: usize = 8;
 /// Side of the compared windows at full resolution.
-const FINE: usize = 13;
+const FINE_WINDOW: usize = 13;
 /// Search radius around the match of half resolution, in pixels at full resolution.
 const FINE_RADIUS: i32 = 2;
 /// Radius of the window in which a point's gradients are summed.
@@ -27,7 +27,7 @@ const UNIQUENESS_RATIO: f32 = 0.6;
 const PEAK_RADIUS: i32 = 3;
 
 /// Returns a picture with half as many columns and rows, averaged.
-pub(super) fn halve(image: &GrayImage) -> GrayImage {
+pub(super) fn halve_picture(image: &GrayImage) -> GrayImage {
     let (width, height, stride) = (image.width / 2, image.height / 2, image.width as usize);
     let mut luma = vec![0; width as usize * height as usize];
     let rows = image.luma.chunks_exact(2 * stride.max(1)).map(|rows| rows.split_at(stride));
@@ -56,7 +56,7 @@ pub(super) fn find_corners(image: &GrayImage) -> Vec<(i32, i32)> {
         ((across + down) / 2.0 - half.hypot(both)) / pixels
     };
     // Keeps the compared windows and those of the gradients inside.
-    let border = COARSE;
+    let border = COARSE_WINDOW;
     let mut found = Vec::new();
     for top in (border..height.saturating_sub(border)).step_by(CELL) {
         for first in (border..width.saturating_sub(border)).step_by(CELL) {
@@ -78,7 +78,7 @@ pub(super) fn find_corners(image: &GrayImage) -> Vec<(i32, i32)> {
 }
 
 /// A picture at half resolution, prepared for searching.
-pub(super) struct Coarse {
+pub(super) struct SearchPicture {
     width: usize,
     height: usize,
     values: Vec<f32>,
@@ -88,23 +88,23 @@ pub(super) struct Coarse {
     max_disparity: i32,
 }
 
-impl Coarse {
+impl SearchPicture {
     /// Prepares a picture at half resolution; `max_disparity` is the largest disparity there.
     pub fn new(image: &GrayImage, max_disparity: i32) -> Self {
         let (width, height) = (image.width as usize, image.height as usize);
         let values: Vec<f32> = image.luma.iter().map(|&luma| f32::from(luma)).collect();
         let mut inverse_norm = vec![0.0; values.len()];
-        for y in 0..(height + 1).saturating_sub(COARSE) {
-            for x in 0..(width + 1).saturating_sub(COARSE) {
+        for y in 0..(height + 1).saturating_sub(COARSE_WINDOW) {
+            for x in 0..(width + 1).saturating_sub(COARSE_WINDOW) {
                 let (mut sum, mut squares) = (0.0, 0.0);
-                for row in 0..COARSE {
-                    for value in &values[(y + row) * width + x..][..COARSE] {
+                for row in 0..COARSE_WINDOW {
+                    for value in &values[(y + row) * width + x..][..COARSE_WINDOW] {
                         (sum, squares) = (sum + value, squares + value * value);
                     }
                 }
-                let variance = squares - sum * sum / (COARSE * COARSE) as f32;
+                let variance = squares - sum * sum / (COARSE_WINDOW * COARSE_WINDOW) as f32;
                 // Variations below one level per pixel are only noise.
-                let is_textured = variance > (COARSE * COARSE) as f32;
+                let is_textured = variance > (COARSE_WINDOW * COARSE_WINDOW) as f32;
                 inverse_norm[y * width + x] = if is_textured { variance.sqrt().recip() } else { 0.0 };
             }
         }
@@ -114,24 +114,24 @@ impl Coarse {
 
 /// Finds the point `at` of the picture `from` in the picture `into`, at half resolution, by normalised
 /// cross-correlation. Outputs its displacement across and down; `None` without a good and unique match.
-pub(super) struct Search<'a> {
+pub(super) struct MatchSearch<'a> {
     pub from: &'a GrayImage,
-    pub into: &'a Coarse,
+    pub into: &'a SearchPicture,
     pub at: (i32, i32),
     /// Buffer for the scores of all places.
     pub scores: &'a mut Vec<f32>,
 }
 
-impl WithSimd for Search<'_> {
+impl WithSimd for MatchSearch<'_> {
     type Output = Option<(i32, i32)>;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Option<(i32, i32)> {
-        let &Coarse { width, height, max_disparity, .. } = self.into;
+        let &SearchPicture { width, height, max_disparity, .. } = self.into;
         // Windows are identified by their upper left pixel.
-        let (x, y) = (self.at.0 - COARSE as i32 / 2, self.at.1 - COARSE as i32 / 2);
-        let mut patch = [0.0_f32; COARSE * COARSE];
-        for (row, patch) in patch.chunks_exact_mut(COARSE).enumerate() {
-            let from = &self.from.luma[(y as usize + row) * width + x as usize..][..COARSE];
+        let (x, y) = (self.at.0 - COARSE_WINDOW as i32 / 2, self.at.1 - COARSE_WINDOW as i32 / 2);
+        let mut patch = [0.0_f32; COARSE_WINDOW * COARSE_WINDOW];
+        for (row, patch) in patch.chunks_exact_mut(COARSE_WINDOW).enumerate() {
+            let from = &self.from.luma[(y as usize + row) * width + x as usize..][..COARSE_WINDOW];
             patch.iter_mut().zip(from).for_each(|(patch, &luma)| *patch = f32::from(luma));
         }
         let mean = patch.iter().sum::<f32>() / patch.len() as f32;
@@ -142,12 +142,12 @@ impl WithSimd for Search<'_> {
             return None;
         }
         let first_x = (x - max_disparity).max(0);
-        let places = ((x + max_disparity).min((width - COARSE) as i32) - first_x + 1) as usize;
-        let rows = (y - SEARCH_ROWS).max(0)..(y + SEARCH_ROWS).min((height - COARSE) as i32) + 1;
+        let places = ((x + max_disparity).min((width - COARSE_WINDOW) as i32) - first_x + 1) as usize;
+        let rows = (y - SEARCH_ROWS).max(0)..(y + SEARCH_ROWS).min((height - COARSE_WINDOW) as i32) + 1;
         self.scores.clear();
         self.scores.resize(places * rows.len(), 0.0);
         for (scores, top) in self.scores.chunks_exact_mut(places).zip(rows.clone()) {
-            for (row, weights) in patch.chunks_exact(COARSE).enumerate() {
+            for (row, weights) in patch.chunks_exact(COARSE_WINDOW).enumerate() {
                 let start = (top as usize + row) * width + first_x as usize;
                 for (column, &weight) in weights.iter().enumerate() {
                     let values = &self.into.values[start + column..][..places];
@@ -182,7 +182,12 @@ impl WithSimd for Search<'_> {
 
 /// Refines the displacement (across, down) of the point `at`, about `moved`, at full resolution with subpixel accuracy;
 /// `None` without a peak.
-pub(super) fn refine(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved: (i32, i32)) -> Option<(f32, f32)> {
+pub(super) fn refine_subpixel(
+    left: &GrayImage,
+    right: &GrayImage,
+    at: (i32, i32),
+    moved: (i32, i32),
+) -> Option<(f32, f32)> {
     const SIDE: usize = (2 * FINE_RADIUS + 1) as usize;
     let patch = normalized_window(left, at)?;
     let mut scores = [[0.0; SIDE]; SIDE];
@@ -210,15 +215,18 @@ pub(super) fn refine(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved:
 }
 
 /// Returns the window around a pixel, scaled to mean 0 and norm 1; `None` if it leaves the picture or has no texture.
-fn normalized_window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
-    let (x, y) = (x - FINE as i32 / 2, y - FINE as i32 / 2);
-    let is_inside = x >= 0 && y >= 0 && x + FINE as i32 <= image.width as i32 && y + FINE as i32 <= image.height as i32;
-    let mut values = [0.0; FINE * FINE];
+fn normalized_window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE_WINDOW * FINE_WINDOW]> {
+    let (x, y) = (x - FINE_WINDOW as i32 / 2, y - FINE_WINDOW as i32 / 2);
+    let is_inside = x >= 0
+        && y >= 0
+        && x + FINE_WINDOW as i32 <= image.width as i32
+        && y + FINE_WINDOW as i32 <= image.height as i32;
+    let mut values = [0.0; FINE_WINDOW * FINE_WINDOW];
     if !is_inside {
         return None;
     }
-    for (row, values) in values.chunks_exact_mut(FINE).enumerate() {
-        let from = &image.luma[(y as usize + row) * image.width as usize + x as usize..][..FINE];
+    for (row, values) in values.chunks_exact_mut(FINE_WINDOW).enumerate() {
+        let from = &image.luma[(y as usize + row) * image.width as usize + x as usize..][..FINE_WINDOW];
         values.iter_mut().zip(from).for_each(|(value, &luma)| *value = f32::from(luma));
     }
     let mean = values.iter().sum::<f32>() / values.len() as f32;

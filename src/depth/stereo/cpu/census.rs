@@ -20,7 +20,7 @@ pub const PLANES: usize = BITS / 8;
 pub const RADIUS: usize = 4;
 
 /// Returns column and row of the neighbour of bit `bit`, from the corner of the window.
-const fn neighbour(bit: usize) -> (usize, usize) {
+const fn neighbour_offset(bit: usize) -> (usize, usize) {
     // The 13th of the 5x5 samples is the pixel itself.
     let cell = if bit < BITS / 2 { bit } else { bit + 1 };
     (cell % 5 * 2, cell / 5 * 2)
@@ -67,7 +67,7 @@ impl Census {
         let codes = DisjointParts::new(&mut self.codes, stride * PLANES, taken);
         workers.run(height, &|y| {
             let window = &padded[y * padded_stride..(y + 2 * RADIUS + 1) * padded_stride];
-            arch.dispatch(Row { window, width, mirrored, out: codes.part(y) });
+            arch.dispatch(CensusRow { window, width, mirrored, out: codes.part(y) });
         });
     }
 
@@ -94,7 +94,7 @@ fn pad(row: &[u8], mirrored: bool, padded: &mut [u8]) {
 }
 
 /// Computes the codes of one row, plane by plane.
-struct Row<'a> {
+struct CensusRow<'a> {
     /// `2 * RADIUS + 1` padded rows.
     window: &'a [u8],
     width: usize,
@@ -102,7 +102,7 @@ struct Row<'a> {
     out: &'a mut [u8],
 }
 
-impl WithSimd for Row<'_> {
+impl WithSimd for CensusRow<'_> {
     type Output = ();
     #[inline(always)]
     // No explicit vectors: the compiler vectorises these loops for the instruction set that `pulp` selects.
@@ -114,7 +114,7 @@ impl WithSimd for Row<'_> {
             let out = &mut out[..width];
             out.fill(0);
             for bit in 0..8 {
-                let (column, row) = neighbour(plane * 8 + bit);
+                let (column, row) = neighbour_offset(plane * 8 + bit);
                 // In a mirrored row the neighbours are mirrored back, so that a bit means the same in both pictures.
                 let column = if mirrored { 2 * RADIUS - column } else { column };
                 let beside = &window[row * stride + column..][..width];

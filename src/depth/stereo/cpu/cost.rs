@@ -2,7 +2,7 @@
 //!
 //! twin: shaders/stereo_cost.wgsl
 
-use super::super::fixed::{BONUS, OUTSIDE};
+use super::super::fixed::{OUTSIDE_COST, PRIOR_BONUS};
 use super::GROUP;
 use super::census::PLANES;
 use crate::compute::aligned::CacheAligned;
@@ -11,22 +11,22 @@ use crate::compute::aligned::CacheAligned;
 pub const ROWS: usize = GROUP + 2;
 
 /// Census planes of a left row, and of the right one in mirrored order.
-pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
+pub type CensusCodes<'a> = [[&'a [u8]; PLANES]; 2];
 
 /// Computes the costs of a group of rows, 0 to 27, from the last column to the first: an eighth of the sum of the
 /// distances over three rows and columns.
 pub struct Costs<'a, const N: usize> {
     /// From the row above the group to the one below it.
-    codes: [Codes<'a>; ROWS],
+    codes: [CensusCodes<'a>; ROWS],
     width: usize,
     /// Distances summed over three rows: of the column whose costs are next, and of it plus the one right of it.
-    here: CacheAligned<[[u8; N]; GROUP]>,
-    two: CacheAligned<[[u8; N]; GROUP]>,
+    column_sums: CacheAligned<[[u8; N]; GROUP]>,
+    pair_sums: CacheAligned<[[u8; N]; GROUP]>,
 }
 
 impl<'a, const N: usize> Costs<'a, N> {
     #[inline(always)]
-    pub fn new(mut codes: [Codes<'a>; ROWS], width: usize) -> Self {
+    pub fn new(mut codes: [CensusCodes<'a>; ROWS], width: usize) -> Self {
         // Slices of equal length need only one bounds check.
         for [left, right] in &mut codes {
             for plane in 0..PLANES {
@@ -34,7 +34,8 @@ impl<'a, const N: usize> Costs<'a, N> {
                 right[plane] = &right[plane][..width + N];
             }
         }
-        let mut first = Self { codes, width, here: CacheAligned([[0; N]; GROUP]), two: CacheAligned([[0; N]; GROUP]) };
+        let mut first =
+            Self { codes, width, column_sums: CacheAligned([[0; N]; GROUP]), pair_sums: CacheAligned([[0; N]; GROUP]) };
         // Beyond the borders the outermost columns repeat.
         first.advance(width - 1);
         first.advance(width - 1);
@@ -57,24 +58,24 @@ impl<'a, const N: usize> Costs<'a, N> {
         for row in 0..ROWS {
             for plane in 0..PLANES {
                 left[row][plane] = self.codes[row][0][plane][x];
-                right[row][plane] = array(&self.codes[row][1][plane][first..]);
+                right[row][plane] = first_values(&self.codes[row][1][plane][first..]);
             }
         }
-        let (numbers, last_inside) = (numbers::<N>(), x.min(N - 1) as u8);
+        let (numbers, last_inside) = (disparity_bytes::<N>(), x.min(N - 1) as u8);
         let mut costs = CacheAligned([[0; N]; GROUP]);
         for d in 0..N {
-            let mut differing = [0; ROWS];
+            let mut distances = [0; ROWS];
             for row in 0..ROWS {
                 let [a, b, c] = left[row];
                 let [of_a, of_b, of_c] = right[row];
-                let bits = bits(a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
-                differing[row] = if numbers[d] > last_inside { OUTSIDE } else { bits };
+                let bits = count_bits(a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
+                distances[row] = if numbers[d] > last_inside { OUTSIDE_COST } else { bits };
             }
             for row in 0..GROUP {
-                let next = differing[row] + differing[row + 1] + differing[row + 2];
-                costs.0[row][d] = (self.two.0[row][d] + next + 4) >> 3;
-                self.two.0[row][d] = self.here.0[row][d] + next;
-                self.here.0[row][d] = next;
+                let next = distances[row] + distances[row + 1] + distances[row + 2];
+                costs.0[row][d] = (self.pair_sums.0[row][d] + next + 4) >> 3;
+                self.pair_sums.0[row][d] = self.column_sums.0[row][d] + next;
+                self.column_sums.0[row][d] = next;
             }
         }
         costs
@@ -83,31 +84,31 @@ impl<'a, const N: usize> Costs<'a, N> {
 
 /// Counts the bits of three bytes, 0 to 24.
 #[inline(always)]
-fn bits(a: u8, b: u8, c: u8) -> u8 {
+fn count_bits(a: u8, b: u8, c: u8) -> u8 {
     // A carry-save adder: the population counts of two bytes suffice for three.
     let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a | b)));
     ones.count_ones() as u8 + 2 * twos.count_ones() as u8
 }
 
-/// Returns the reduction of a pixel's cost by disparity: [`BONUS`] for the likely disparity and those one above and
-/// below it. `likely` is one more than the likely disparity, or 0 without one.
+/// Returns the reduction of a pixel's cost by disparity: [`PRIOR_BONUS`] for the likely disparity and those one above
+/// and below it. `likely` is one more than the likely disparity, or 0 without one.
 #[inline(always)]
-pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
-    let (near, bonus) = (likely.wrapping_sub(1) as u8, if likely > 0 { BONUS } else { 0 });
+pub fn prior_bonus(likely: u16) -> impl Fn(u8) -> u8 {
+    let (near, bonus) = (likely.wrapping_sub(1) as u8, if likely > 0 { PRIOR_BONUS } else { 0 });
     // Not `abs_diff`, which is computed in 32 bits.
     move |d| if d.max(near) - d.min(near) <= 1 { bonus } else { 0 }
 }
 
 /// Returns the first `N` values.
 #[inline(always)]
-pub fn array<const N: usize>(values: &[u8]) -> &[u8; N] {
+pub fn first_values<const N: usize>(values: &[u8]) -> &[u8; N] {
     values.first_chunk().expect("rows are long enough")
 }
 
 /// Returns the disparities as bytes. They are read from memory, because the compiler compares a loop index in 64 bits,
 /// whatever it is converted to.
 #[inline(always)]
-pub fn numbers<const N: usize>() -> &'static [u8; N] {
+pub fn disparity_bytes<const N: usize>() -> &'static [u8; N] {
     static NUMBERS: CacheAligned<[u8; 256]> = {
         let mut numbers = [0; 256];
         let mut d = 0;
@@ -117,5 +118,5 @@ pub fn numbers<const N: usize>() -> &'static [u8; N] {
         }
         CacheAligned(numbers)
     };
-    array(&NUMBERS.0)
+    first_values(&NUMBERS.0)
 }

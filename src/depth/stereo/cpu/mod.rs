@@ -9,9 +9,9 @@ mod speckle;
 mod sweep;
 mod winner;
 
-use prior::Prior;
+use prior::TemporalPrior;
 use semi_global::SemiGlobal;
-use speckle::Speckles;
+use speckle::SpeckleFilter;
 
 use super::executor::Executor;
 use super::fixed::FILLED;
@@ -26,23 +26,23 @@ const GROUP: usize = 4;
 /// Matches pairs of one size on the CPU.
 pub struct CpuExecutor {
     width: usize,
-    /// Islands of at most this many pixels are removed.
-    island: u32,
-    prior: Prior,
+    /// Speckles of at most this many pixels are removed.
+    max_speckle: u32,
+    prior: TemporalPrior,
     semi_global: SemiGlobal,
-    speckles: Speckles,
+    speckles: SpeckleFilter,
 }
 
 impl CpuExecutor {
     /// Creates an executor for pairs of this size and at least `disparities` candidates, at most 256, that removes
-    /// islands of up to `island` pixels.
-    pub fn new(size: (usize, usize), disparities: usize, island: u32, threads: usize) -> Self {
+    /// speckles of up to `max_speckle` pixels.
+    pub fn new(size: (usize, usize), disparities: usize, max_speckle: u32, threads: usize) -> Self {
         Self {
             width: size.0,
-            island,
-            prior: Prior::new(size.0),
+            max_speckle,
+            prior: TemporalPrior::new(size.0),
             semi_global: SemiGlobal::new(size, disparities, threads),
-            speckles: Speckles::new(size.0 * size.1),
+            speckles: SpeckleFilter::new(size.0 * size.1),
         }
     }
 }
@@ -52,13 +52,18 @@ impl Executor for CpuExecutor {
         self.semi_global.describe()
     }
 
-    fn disparities(&mut self, pair: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+    fn compute_disparities(
+        &mut self,
+        pair: [&[u8]; 2],
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) -> Result<(), GpuError> {
         let Self { width, prior, semi_global, speckles, .. } = self;
         let width = *width;
-        semi_global.winners(pair, prior.likely(pair[0], workers), workers, out);
-        speckles.remove(out, width, self.island, workers);
+        semi_global.match_pair(pair, prior.find_likely(pair[0], workers), workers, out);
+        speckles.remove_speckles(out, width, self.max_speckle, workers);
         // Before filling: filled disparities are no evidence for the next pair.
-        prior.keep(pair[0], out);
+        prior.store_pair(pair[0], out);
         let bands = Bands::new(out.len() / width, 1, workers).split(out, width);
         workers.run_each(bands, &|band: &mut [u16]| {
             for row in band.chunks_exact_mut(width) {

@@ -22,12 +22,12 @@ const LENGTH: usize = 2 * GUARD + Settings::MAX_DISPARITIES as usize;
 /// The values L(q, d) of a path at a pixel, between padding that is never the minimum, and their minimum.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-pub struct Values {
+pub struct PathValues {
     values: [u8; LENGTH],
     pub least: u8,
 }
 
-impl Values {
+impl PathValues {
     /// Returns the values before the first pixel of a path: zeros, so that the first values are the costs.
     pub fn start<const N: usize>() -> Self {
         let mut start = Self { values: [u8::MAX; LENGTH], least: 0 };
@@ -61,14 +61,14 @@ impl Values {
 
     /// Returns the step of the path to a pixel whose P2 is `p2`.
     #[inline(always)]
-    pub fn step<const N: usize>(&self, p2: u8) -> Step<'_, N> {
+    pub fn step_to<const N: usize>(&self, p2: u8) -> PathStep<'_, N> {
         let [lower, same, upper] = [self.shifted(-1), self.shifted(0), self.shifted(1)];
-        Step { lower, same, upper, least: self.least, min_plus_p2: self.least + p2 }
+        PathStep { lower, same, upper, least: self.least, min_plus_p2: self.least + p2 }
     }
 }
 
 /// A step of a path from one pixel to the next.
-pub struct Step<'a, const N: usize> {
+pub struct PathStep<'a, const N: usize> {
     lower: &'a [u8; N],
     same: &'a [u8; N],
     upper: &'a [u8; N],
@@ -76,7 +76,7 @@ pub struct Step<'a, const N: usize> {
     min_plus_p2: u8,
 }
 
-impl<const N: usize> Step<'_, N> {
+impl<const N: usize> PathStep<'_, N> {
     /// Returns L(p, d) at a pixel with this cost, by the recurrence above.
     #[inline(always)]
     pub fn value(&self, d: usize, cost: u8) -> u8 {
@@ -90,20 +90,20 @@ impl<const N: usize> Step<'_, N> {
 /// line.
 pub struct Paths {
     /// Along the rows, at the previous and the current pixel in turn.
-    pub along: [[Values; GROUP]; 2],
+    pub along: [[PathValues; GROUP]; 2],
     /// Down a column: above each row, and below the last one.
-    pub down: [Values; GROUP + 1],
+    pub down: [PathValues; GROUP + 1],
 }
 
 impl Paths {
     pub fn new() -> Self {
-        Self { along: [[Values::start::<0>(); GROUP]; 2], down: [Values::start::<0>(); GROUP + 1] }
+        Self { along: [[PathValues::start::<0>(); GROUP]; 2], down: [PathValues::start::<0>(); GROUP + 1] }
     }
 
     /// Resets the paths to before their first pixels.
     pub fn clear<const N: usize>(&mut self) {
-        self.along = [[Values::start::<N>(); GROUP]; 2];
-        self.down = [Values::start::<N>(); GROUP + 1];
+        self.along = [[PathValues::start::<N>(); GROUP]; 2];
+        self.down = [PathValues::start::<N>(); GROUP + 1];
     }
 }
 

@@ -8,13 +8,13 @@
 
 use pulp::{Arch, WithSimd};
 
-use super::super::fixed::{NOISE, ONE, UNKNOWN};
+use super::super::fixed::{MAX_NOISE, ONE, UNKNOWN};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MAX_ITEMS, ThreadPool};
 
 /// Stores the last pair.
 #[derive(Debug, Default)]
-pub struct Prior {
+pub struct TemporalPrior {
     width: usize,
     /// The last left picture; empty before the first.
     luma: Vec<u8>,
@@ -26,7 +26,7 @@ pub struct Prior {
     likely: Vec<u16>,
 }
 
-impl Prior {
+impl TemporalPrior {
     /// Creates a prior without a last pair, for pictures of `width` columns.
     pub fn new(width: usize) -> Self {
         Self { width, ..Self::default() }
@@ -34,7 +34,7 @@ impl Prior {
 
     /// Returns one more than the likely disparity of each pixel of the left picture `luma`, in whole pixels, or 0;
     /// `None` before the first pair.
-    pub fn likely(&mut self, luma: &[u8], workers: &mut ThreadPool) -> Option<&[u16]> {
+    pub fn find_likely(&mut self, luma: &[u8], workers: &mut ThreadPool) -> Option<&[u16]> {
         if self.luma.len() != luma.len() {
             return None;
         }
@@ -50,14 +50,14 @@ impl Prior {
             for (y, likely) in rows.zip(likely.chunks_exact_mut(width)) {
                 let three = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
                 let rows = three.map(|y| [luma, last].map(|luma| &luma[y * width..(y + 1) * width]));
-                arch.dispatch(Likely { rows, map: &map[y * width..(y + 1) * width], changes, likely });
+                arch.dispatch(LikelyRow { rows, map: &map[y * width..(y + 1) * width], changes, likely });
             }
         });
         Some(likely)
     }
 
     /// Stores a pair: its left picture, and its disparities in fixed point or [`UNKNOWN`].
-    pub fn keep(&mut self, luma: &[u8], map: &[u16]) {
+    pub fn store_pair(&mut self, luma: &[u8], map: &[u16]) {
         self.luma.clear();
         self.luma.extend_from_slice(luma);
         self.map.clear();
@@ -66,7 +66,7 @@ impl Prior {
 }
 
 /// Computes the likely disparities of a row.
-struct Likely<'a> {
+struct LikelyRow<'a> {
     /// Current and last picture, in this row and those above and below.
     rows: [[&'a [u8]; 2]; 3],
     /// The last disparities.
@@ -75,7 +75,7 @@ struct Likely<'a> {
     likely: &'a mut [u16],
 }
 
-impl WithSimd for Likely<'_> {
+impl WithSimd for LikelyRow<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
@@ -89,13 +89,13 @@ impl WithSimd for Likely<'_> {
                 changes[x] += u16::from(here[x].max(last[x]) - here[x].min(last[x]));
             }
         }
-        let pick = |d: u16, change: u16| {
-            if (change <= NOISE) & (d != UNKNOWN) { (d.wrapping_add(ONE / 2)) / ONE + 1 } else { 0 }
+        let likely_disparity = |d: u16, change: u16| {
+            if (change <= MAX_NOISE) & (d != UNKNOWN) { (d.wrapping_add(ONE / 2)) / ONE + 1 } else { 0 }
         };
         let last = width - 1;
         for x in [0, last] {
             let change = changes[x.saturating_sub(1)] + changes[x] + changes[(x + 1).min(last)];
-            likely[x] = pick(map[x], change);
+            likely[x] = likely_disparity(map[x], change);
         }
         // Slices of equal length need no bounds checks, so that this loop becomes vector code.
         let inner = width.saturating_sub(2);
@@ -103,7 +103,7 @@ impl WithSimd for Likely<'_> {
             (&changes[..inner], &changes[width - inner - 1..][..inner], &changes[width - inner..]);
         let (map, likely) = (&map[width - inner - 1..][..inner], &mut likely[width - inner - 1..][..inner]);
         for x in 0..inner {
-            likely[x] = pick(map[x], before[x] + here[x] + after[x]);
+            likely[x] = likely_disparity(map[x], before[x] + here[x] + after[x]);
         }
     }
 }
@@ -118,14 +118,14 @@ mod tests {
         let luma: Vec<u8> = (0..width * height).map(|i| (i * 7 % 200) as u8).collect();
         let mut map = vec![5 * ONE + ONE / 2; width * height];
         map[3] = UNKNOWN;
-        let mut prior = Prior::new(width);
+        let mut prior = TemporalPrior::new(width);
         let mut workers = ThreadPool::new("test", 2);
-        assert!(prior.likely(&luma, &mut workers).is_none(), "before the first pair");
-        prior.keep(&luma, &map);
+        assert!(prior.find_likely(&luma, &mut workers).is_none(), "before the first pair");
+        prior.store_pair(&luma, &map);
         // Noise, and a change at (10, 5).
         let mut next: Vec<u8> = luma.iter().enumerate().map(|(i, &v)| v + (i % 3) as u8).collect();
         next[5 * width + 10] += 50;
-        let likely = prior.likely(&next, &mut workers).unwrap();
+        let likely = prior.find_likely(&next, &mut workers).unwrap();
         for (i, &d) in likely.iter().enumerate() {
             let moved = (i % width).abs_diff(10) <= 1 && (i / width).abs_diff(5) <= 1;
             assert_eq!(d, if i == 3 || moved { 0 } else { 7 }, "{i}");

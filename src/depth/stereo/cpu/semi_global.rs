@@ -14,7 +14,7 @@ use super::super::penalty::Penalties;
 use super::GROUP;
 use super::census::{self, Census};
 use super::path::{Paths, StepPenalties};
-use super::sweep::{BLOCK, Cells, ConsistencyCheck, DownPaths, FromLeft, FromRight};
+use super::sweep::{BLOCK, Cells, ConsistencyCheck, DownPaths, SweepFromLeft, SweepFromRight};
 use super::winner::Winners;
 use crate::compute::simd;
 use crate::compute::thread_pool::wavefront::Wavefront;
@@ -47,7 +47,7 @@ struct Scratch {
 impl SemiGlobal {
     /// Allocates for pairs of this size and at least `disparities` candidates, at most 256.
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
-        let disparities = fixed::range(disparities);
+        let disparities = fixed::candidate_count(disparities);
         let new_scratch = || Scratch {
             p2: StepPenalties::new(width),
             cells: Cells::new(width, disparities),
@@ -70,7 +70,7 @@ impl SemiGlobal {
     }
 
     /// Matches a pair whose census codes are computed, with `N` disparities.
-    fn match_range<const N: usize>(
+    fn match_disparities<const N: usize>(
         &mut self,
         left: &[u8],
         likely: Option<&[u16]>,
@@ -91,12 +91,12 @@ impl SemiGlobal {
             let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
             let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
             paths.clear::<N>();
-            arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
+            arch.dispatch(SweepFromRight::<N> { codes, p2, likely, cells, paths });
             paths.clear::<N>();
             winners.clear();
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, winners });
+                arch.dispatch(SweepFromLeft::<N> { p2, cells, first, paths, down: &mut down, winners });
             }
             arch.dispatch(ConsistencyCheck { winners, out: out.part(part) });
         });
@@ -108,8 +108,8 @@ impl SemiGlobal {
     }
 
     /// Writes the disparities of the left picture to `out`, in fixed point, or unknown. `likely` has one more than the
-    /// likely disparity of each pixel, or 0: that one and those beside it cost [`fixed::BONUS`] less.
-    pub fn winners(
+    /// likely disparity of each pixel, or 0: that one and those beside it cost [`fixed::PRIOR_BONUS`] less.
+    pub fn match_pair(
         &mut self,
         [left, right]: [&[u8]; 2],
         likely: Option<&[u16]>,
@@ -120,13 +120,13 @@ impl SemiGlobal {
         self.left.compute(left, workers, *arch, taken);
         self.right.compute(right, workers, *arch, taken);
         match self.disparities {
-            16 => self.match_range::<16>(left, likely, workers, out),
-            32 => self.match_range::<32>(left, likely, workers, out),
-            64 => self.match_range::<64>(left, likely, workers, out),
-            96 => self.match_range::<96>(left, likely, workers, out),
-            128 => self.match_range::<128>(left, likely, workers, out),
-            192 => self.match_range::<192>(left, likely, workers, out),
-            _ => self.match_range::<256>(left, likely, workers, out),
+            16 => self.match_disparities::<16>(left, likely, workers, out),
+            32 => self.match_disparities::<32>(left, likely, workers, out),
+            64 => self.match_disparities::<64>(left, likely, workers, out),
+            96 => self.match_disparities::<96>(left, likely, workers, out),
+            128 => self.match_disparities::<128>(left, likely, workers, out),
+            192 => self.match_disparities::<192>(left, likely, workers, out),
+            _ => self.match_disparities::<256>(left, likely, workers, out),
         }
     }
 }

@@ -4,9 +4,9 @@
 use pulp::WithSimd;
 
 use super::GROUP;
-use super::cost::{self, Codes, Costs};
-use super::path::{Paths, StepPenalties, Values};
-use super::winner::{Row, Winners};
+use super::cost::{self, CensusCodes, Costs};
+use super::path::{PathValues, Paths, StepPenalties};
+use super::winner::{WinnerRow, Winners};
 use crate::compute::aligned::{Aligned, CacheAligned};
 
 /// Output of the sweep from the right for a group, `[column][row]`: the costs, and half of the values of the path from
@@ -34,9 +34,9 @@ impl Cells {
 }
 
 /// Computes the costs of a group, and the path from the right.
-pub struct FromRight<'a, const N: usize> {
+pub struct SweepFromRight<'a, const N: usize> {
     /// From the row above the group to the one below it.
-    pub codes: [Codes<'a>; cost::ROWS],
+    pub codes: [CensusCodes<'a>; cost::ROWS],
     pub p2: &'a StepPenalties,
     /// For each row, one more than the likely disparity of each pixel, or 0.
     pub likely: Option<[&'a [u16]; GROUP]>,
@@ -45,13 +45,13 @@ pub struct FromRight<'a, const N: usize> {
     pub paths: &'a mut Paths,
 }
 
-impl<const N: usize> WithSimd for FromRight<'_, N> {
+impl<const N: usize> WithSimd for SweepFromRight<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { codes, p2, likely, cells, paths } = self;
         let width = p2.along.len();
-        let mut column = Column { p2, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
+        let mut column = RightSweep { p2, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
         let [one, two] = &mut paths.along;
         for x in (0..width).rev().step_by(2) {
             column.advance(x, one, two);
@@ -63,17 +63,17 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
 }
 
 /// State of a sweep from the right.
-struct Column<'a, const N: usize> {
+struct RightSweep<'a, const N: usize> {
     p2: &'a StepPenalties,
     likely: Option<[&'a [u16]; GROUP]>,
     costs: Costs<'a, N>,
     cells: &'a mut [Cell<N>],
 }
 
-impl<const N: usize> Column<'_, N> {
+impl<const N: usize> RightSweep<'_, N> {
     /// Advances the paths to column `x`.
     #[inline(always)]
-    fn advance(&mut self, x: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+    fn advance(&mut self, x: usize, before: &[PathValues; GROUP], now: &mut [PathValues; GROUP]) {
         let raw_costs = self.costs.next_column(x);
         let along = &self.p2.along;
         let p2 = along[(x + 1).min(along.len() - 1)];
@@ -81,7 +81,7 @@ impl<const N: usize> Column<'_, N> {
         let cells = &mut self.cells[x];
         for row in 0..GROUP {
             let mut cell = CacheAligned([[0; N]; 2]);
-            step(&before[row], p2[row], likely[row], &raw_costs.0[row], &mut now[row], &mut cell.0);
+            advance_path(&before[row], p2[row], likely[row], &raw_costs.0[row], &mut now[row], &mut cell.0);
             cells[row] = cell.0;
         }
     }
@@ -89,19 +89,20 @@ impl<const N: usize> Column<'_, N> {
 
 /// Computes a step of a path; `raw_costs` are the costs without the bonus for the likely disparity.
 #[inline(always)]
-fn step<const N: usize>(
-    before: &Values,
+fn advance_path<const N: usize>(
+    before: &PathValues,
     p2: u8,
     likely: u16,
     raw_costs: &[u8; N],
-    now: &mut Values,
+    now: &mut PathValues,
     [costs, halves]: &mut [[u8; N]; 2],
 ) {
-    let (step, bonus, numbers) = (before.step::<N>(p2), cost::bonus(likely), cost::numbers::<N>());
+    let (step, prior_bonus, disparities) =
+        (before.step_to::<N>(p2), cost::prior_bonus(likely), cost::disparity_bytes::<N>());
     let values = now.as_array_mut::<N>();
     let mut least = u8::MAX;
     for d in 0..N {
-        let cost = raw_costs[d].saturating_sub(bonus(numbers[d]));
+        let cost = raw_costs[d].saturating_sub(prior_bonus(disparities[d]));
         let value = step.value(d, cost);
         costs[d] = cost;
         values[d] = value;
@@ -134,7 +135,7 @@ impl DownPaths {
 }
 
 /// Computes the paths from the left and from above in a block of columns, and the winners of the sums of all paths.
-pub struct FromLeft<'a, const N: usize> {
+pub struct SweepFromLeft<'a, const N: usize> {
     pub p2: &'a StepPenalties,
     pub cells: &'a Cells,
     /// First column of the block.
@@ -144,17 +145,17 @@ pub struct FromLeft<'a, const N: usize> {
     pub winners: &'a mut Winners,
 }
 
-impl<const N: usize> WithSimd for FromLeft<'_, N> {
+impl<const N: usize> WithSimd for SweepFromLeft<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { p2, cells, first, paths, down, winners } = self;
         let end = (first + BLOCK).min(p2.along.len());
-        let mut block = Block::<N> {
+        let mut block = LeftSweep::<N> {
             p2: [&p2.along[first..end], &p2.down[first..end]],
             cells: &cells.columns()[first..end],
             columns: end - first,
-            rows: winners.rows(first..end),
+            rows: winners.rows_mut(first..end),
         };
         let Paths { along: [one, two], down: between } = paths;
         between[0].set(&down.values.as_chunks::<N>().0[0], down.least[0]);
@@ -168,24 +169,24 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
 }
 
 /// State of a sweep from the left through a block.
-struct Block<'a, const N: usize> {
+struct LeftSweep<'a, const N: usize> {
     /// Along the rows and down the columns.
     p2: [&'a [[u8; GROUP]]; 2],
     cells: &'a [Cell<N>],
     columns: usize,
-    rows: [Row<'a, N>; GROUP],
+    rows: [WinnerRow<'a, N>; GROUP],
 }
 
-impl<const N: usize> Block<'_, N> {
+impl<const N: usize> LeftSweep<'_, N> {
     /// Advances row 0 to column `k`, row 1 to the one before, and so on.
     #[inline(always)]
     fn advance(
         &mut self,
         k: usize,
         down: &mut DownPaths,
-        between: &mut [Values; GROUP + 1],
-        before: &[Values; GROUP],
-        now: &mut [Values; GROUP],
+        between: &mut [PathValues; GROUP + 1],
+        before: &[PathValues; GROUP],
+        now: &mut [PathValues; GROUP],
     ) {
         let states = &mut down.values.as_chunks_mut::<N>().0[..self.columns];
         let past = k.wrapping_sub(GROUP);
@@ -193,10 +194,10 @@ impl<const N: usize> Block<'_, N> {
             states[past] = *between[GROUP].as_array::<N>();
             down.least[past] = between[GROUP].least;
         }
-        self.row::<3>(k, between, before, now);
-        self.row::<2>(k, between, before, now);
-        self.row::<1>(k, between, before, now);
-        self.row::<0>(k, between, before, now);
+        self.advance_row::<3>(k, between, before, now);
+        self.advance_row::<2>(k, between, before, now);
+        self.advance_row::<1>(k, between, before, now);
+        self.advance_row::<0>(k, between, before, now);
         // Loaded one step ahead of its use.
         if k + 1 < self.columns {
             between[0].set(&states[k + 1], down.least[k + 1]);
@@ -205,12 +206,12 @@ impl<const N: usize> Block<'_, N> {
 
     /// Advances a row to its column, if that is inside the block.
     #[inline(always)]
-    fn row<const ROW: usize>(
+    fn advance_row<const ROW: usize>(
         &mut self,
         k: usize,
-        between: &mut [Values; GROUP + 1],
-        before: &[Values; GROUP],
-        now: &mut [Values; GROUP],
+        between: &mut [PathValues; GROUP + 1],
+        before: &[PathValues; GROUP],
+        now: &mut [PathValues; GROUP],
     ) {
         let x = k.wrapping_sub(ROW);
         if x >= self.columns {
@@ -220,23 +221,23 @@ impl<const N: usize> Block<'_, N> {
         let p2 = self.p2.map(|p2| p2[x][ROW]);
         let cell = CacheAligned(self.cells[x][ROW]);
         let (above, below) = between.split_at_mut(ROW + 1);
-        step_two(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
+        advance_two_paths(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
         self.rows[ROW].update(x, &sums.0);
     }
 }
 
 /// Computes a step of the path along a row and of the one down a column, and the sums of all three paths.
 #[inline(always)]
-fn step_two<const N: usize>(
-    before: &Values,
-    above: &Values,
+fn advance_two_paths<const N: usize>(
+    before: &PathValues,
+    above: &PathValues,
     p2: [u8; 2],
     [costs, halves]: &[[u8; N]; 2],
-    now: &mut Values,
-    below: &mut Values,
+    now: &mut PathValues,
+    below: &mut PathValues,
     sums: &mut [u8; N],
 ) {
-    let (along, down) = (before.step::<N>(p2[0]), above.step::<N>(p2[1]));
+    let (along, down) = (before.step_to::<N>(p2[0]), above.step_to::<N>(p2[1]));
     let (along_values, down_values) = (now.as_array_mut::<N>(), below.as_array_mut::<N>());
     let (mut along_least, mut down_least) = (u8::MAX, u8::MAX);
     for d in 0..N {

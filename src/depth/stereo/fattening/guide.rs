@@ -38,12 +38,12 @@ impl Guide {
         taken: &mut [AtomicBool],
     ) -> Channels<'a> {
         let grey = Channels { values: luma, width, is_color: false };
-        let Some(Colors { image, every }) = colors else { return grey };
+        let Some(Colors { image, stride }) = colors else { return grey };
         self.channels.resize(3 * self.pixels, 0);
         let is_color = AtomicBool::new(false);
         let rows = DisjointParts::new(&mut self.channels, 3 * width, taken);
         workers.run(self.pixels / width, &|y| {
-            let row = &image.rgb[3 * image.width as usize * every * y..];
+            let row = &image.rgb[3 * image.width as usize * stride * y..];
             let [red, green, blue] = split_channels(rows.part(y), width);
             let mut differ = 0;
             let mut store = |x: usize, pixel: &[u8]| {
@@ -51,10 +51,10 @@ impl Guide {
                 differ |= (pixel[0] ^ pixel[1]) | (pixel[1] ^ pixel[2]);
             };
             // With a constant step this takes a third of the time.
-            if every == 1 {
+            if stride == 1 {
                 row[..3 * width].as_chunks::<3>().0.iter().enumerate().for_each(|(x, pixel)| store(x, pixel));
             } else {
-                row.chunks(3 * every).take(width).enumerate().for_each(|(x, pixel)| store(x, pixel));
+                row.chunks(3 * stride).take(width).enumerate().for_each(|(x, pixel)| store(x, pixel));
             }
             if differ != 0 {
                 is_color.store(true, Ordering::Relaxed);

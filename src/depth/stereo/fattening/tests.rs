@@ -30,9 +30,9 @@ fn scene([near, far]: [[u8; 3]; 2], fat: isize) -> (ColorImage, Vec<u16>) {
 
 fn corrected(image: &ColorImage, map: &[u16], has_color: bool, threads: usize) -> Vec<u16> {
     let luma: Vec<u8> = image.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb[1]).collect();
-    let colors = has_color.then_some(Colors { image, every: 1 });
+    let colors = has_color.then_some(Colors { image, stride: 1 });
     let mut into = vec![0; map.len()];
-    Fattening::new(SIZE).correct(map, &mut into, &luma, colors, &mut ThreadPool::new("test", threads));
+    FatteningCorrection::new(SIZE).correct(map, &mut into, &luma, colors, &mut ThreadPool::new("test", threads));
     into
 }
 
@@ -106,7 +106,7 @@ fn any_number_of_threads_decides_alike_and_pictures_may_be_tiny() {
     for size in [(1, 1), (3, 2), (LANES - 1, 4), (LANES, 1), (LANES + 1, 2)] {
         let map: Vec<u16> = (0..size.0 * size.1).map(|k| if k % 2 == 0 { NEAR } else { FAR }).collect();
         let (mut into, luma) = (vec![0; map.len()], vec![90; map.len()]);
-        Fattening::new(size).correct(&map, &mut into, &luma, None, &mut ThreadPool::new("test", 2));
+        FatteningCorrection::new(size).correct(&map, &mut into, &luma, None, &mut ThreadPool::new("test", 2));
         assert_eq!(into, map);
     }
 }

@@ -8,9 +8,9 @@
 //! Per-pixel values take one word each, so that no two invocations write the same word. Only two pictures are uploaded
 //! and one map is read back per pair; the state for the next pair stays on the device.
 
+pub mod postprocess;
 pub mod rectifier;
 pub mod shaders;
-pub mod tidying;
 
 use std::sync::Arc;
 
@@ -46,12 +46,17 @@ pub struct GpuExecutor {
 
 impl GpuExecutor {
     /// Creates an executor for pairs of this size (columns, rows) and at least `disparities` candidates, at most 256,
-    /// that removes islands of up to `island` pixels.
+    /// that removes speckles of up to `max_speckle` pixels.
     ///
     /// # Errors
     /// Fails if the device lacks memory or fails.
-    pub fn new(device: &Arc<Device>, size: (usize, usize), disparities: usize, island: u32) -> Result<Self, GpuError> {
-        let ((width, height), disparities) = (size, fixed::range(disparities));
+    pub fn new(
+        device: &Arc<Device>,
+        size: (usize, usize),
+        disparities: usize,
+        max_speckle: u32,
+    ) -> Result<Self, GpuError> {
+        let ((width, height), disparities) = (size, fixed::candidate_count(disparities));
         let pixels = width * height;
         check_limits(device, size, disparities)?;
 
@@ -72,8 +77,8 @@ impl GpuExecutor {
         let words = buffer("words", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
         let readback = Readback::new(device, "words back", pixels * 2);
 
-        let constants = |from_right| shaders::constants(size, disparities, island, from_right);
-        let forwards = constants(false);
+        let constants_for = |from_right| shaders::matcher_constants(size, disparities, max_speckle, from_right);
+        let forwards = constants_for(false);
         let (columns, rows) = (width as u32, height as u32);
         let pass = |shader, buffers: &[&wgpu::Buffer], workgroups| {
             let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
@@ -81,11 +86,12 @@ impl GpuExecutor {
         };
         let along_rows = |from_right| {
             let buffers = [&costs, &penalties, &sums].map(wgpu::Buffer::as_entire_buffer_binding);
-            Pass::new(device, shaders::ROWS, &constants(from_right), buffers, [rows, 1, 1])
+            Pass::new(device, shaders::ROWS, &constants_for(from_right), buffers, [rows, 1, 1])
         };
         // The volumes and penalties are not needed after the winners and serve as scratch memory.
-        let scratch = tidying::Scratch { labels: &costs, sizes: &sums, filled: &penalties };
-        let [runs, join, sizes, gaps, pack] = tidying::passes(device, size, &forwards, &map, scratch, &words);
+        let scratch = postprocess::Scratch { labels: &costs, sizes: &sums, filled: &penalties };
+        let [runs, join, sizes, gaps, pack] =
+            postprocess::create_passes(device, size, &forwards, &map, scratch, &words);
         let tiles = [columns.div_ceil(TILE), rows.div_ceil(TILE), 2];
         let passes = [
             pass(shaders::LIKELY, &[&luma, &last_luma, &map, &likely], linear_workgroups(pixels)),
@@ -145,7 +151,7 @@ impl Executor for GpuExecutor {
         Some(Arc::clone(&self.device))
     }
 
-    fn disparities(
+    fn compute_disparities(
         &mut self,
         [left, right]: [&[u8]; 2],
         workers: &mut ThreadPool,

@@ -13,18 +13,18 @@ pub struct GpuRectifier {
     device: Arc<Device>,
     size: (u32, u32),
     /// Left in colour, right in grey.
-    cameras: [Camera; 2],
+    cameras: [CameraRectifier; 2],
 }
 
 /// Resources for the pictures of one camera.
-struct Camera {
+struct CameraRectifier {
     raw: wgpu::Buffer,
     pass: Pass,
     rectified: wgpu::Buffer,
     readback: Readback,
 }
 
-impl Camera {
+impl CameraRectifier {
     fn new(device: &Device, map: &RemapTable, channels: usize) -> Self {
         use wgpu::BufferUsages as Usage;
         let (width, height) = map.size();
@@ -60,8 +60,9 @@ impl GpuRectifier {
     /// # Errors
     /// Fails if the device lacks memory, fails, or its result differs from the CPU's.
     pub fn new(device: &Arc<Device>, maps: &[RemapTable; 2]) -> Result<Self, GpuError> {
-        let cameras =
-            device.with_error_scope(|| [Camera::new(device, &maps[0], 3), Camera::new(device, &maps[1], 1)])?;
+        let cameras = device.with_error_scope(|| {
+            [CameraRectifier::new(device, &maps[0], 3), CameraRectifier::new(device, &maps[1], 1)]
+        })?;
         let mut made = Self { device: Arc::clone(device), size: maps[0].size(), cameras };
         made.self_test(&maps[1])?;
         device.check()?;
@@ -75,7 +76,7 @@ impl GpuRectifier {
         let from = GrayImage { width, height, luma };
         let (mut expected, mut found) = (GrayImage::default(), GrayImage::default());
         map.remap_gray(&from, &mut expected);
-        self.right(&from, &mut found)?;
+        self.rectify_right(&from, &mut found)?;
         let name = &self.device.name;
         if found.luma == expected.luma {
             Ok(())
@@ -94,7 +95,7 @@ impl GpuRectifier {
     ///
     /// # Panics
     /// Panics if `from` does not have the size of the maps.
-    pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) -> Result<(), GpuError> {
+    pub fn rectify_left(&mut self, from: &ColorImage, into: &mut ColorImage) -> Result<(), GpuError> {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         into.resize(from.width, from.height);
         self.cameras[0].rectify(&self.device, &from.rgb, &mut into.rgb)
@@ -107,7 +108,7 @@ impl GpuRectifier {
     ///
     /// # Panics
     /// Panics if `from` does not have the size of the maps.
-    pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) -> Result<(), GpuError> {
+    pub fn rectify_right(&mut self, from: &GrayImage, into: &mut GrayImage) -> Result<(), GpuError> {
         assert_eq!(from.size(), self.size, "pictures are resampled at one size");
         into.resize(from.width, from.height);
         self.cameras[1].rectify(&self.device, &from.luma, &mut into.luma)

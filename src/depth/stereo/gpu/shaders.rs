@@ -1,6 +1,8 @@
 //! The shaders, and the constants that they share with Rust.
 
-use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, P1, STEP, UNKNOWN};
+use super::super::fixed::{
+    FILLED, MAX_LR_DIFFERENCE, MAX_NOISE, MAX_SPECKLE_STEP, ONE, OUTSIDE_COST, P1, PRIOR_BONUS, UNKNOWN,
+};
 use crate::calibration::map::{DOWN_SHIFT, NOWHERE, ONE as WHOLE};
 use crate::compute::device::{Shader, shader, workgroups_2d};
 
@@ -55,23 +57,28 @@ pub fn linear_workgroups(count: usize) -> [u32; 3] {
 /// The `override` constants of `stereo_common.wgsl`.
 pub type Constants = [(&'static str, f64); 14];
 
-/// Returns the constants for pictures of this size, with islands of up to `island` pixels removed; `from_right`
+/// Returns the constants for pictures of this size, with speckles of up to `max_speckle` pixels removed; `from_right`
 /// reverses the path along the rows.
-pub fn constants((width, height): (usize, usize), disparities: usize, island: u32, from_right: bool) -> Constants {
+pub fn matcher_constants(
+    (width, height): (usize, usize),
+    disparities: usize,
+    max_speckle: u32,
+    from_right: bool,
+) -> Constants {
     [
         ("WIDTH", width as f64),
         ("HEIGHT", height as f64),
         ("WORDS", (disparities / 4) as f64),
-        ("OUTSIDE", OUTSIDE.into()),
-        ("BONUS", BONUS.into()),
+        ("OUTSIDE_COST", OUTSIDE_COST.into()),
+        ("PRIOR_BONUS", PRIOR_BONUS.into()),
         ("P1", P1.into()),
-        ("AGREE", AGREE.into()),
+        ("MAX_LR_DIFFERENCE", MAX_LR_DIFFERENCE.into()),
         ("ONE", ONE.into()),
         ("UNKNOWN", UNKNOWN.into()),
         ("FILLED", FILLED.into()),
-        ("NOISE", NOISE.into()),
-        ("STEP", STEP.into()),
-        ("ISLAND", island.into()),
-        ("BACK", u8::from(from_right).into()),
+        ("MAX_NOISE", MAX_NOISE.into()),
+        ("MAX_SPECKLE_STEP", MAX_SPECKLE_STEP.into()),
+        ("MAX_SPECKLE", max_speckle.into()),
+        ("FROM_RIGHT", u8::from(from_right).into()),
     ]
 }

@@ -41,13 +41,13 @@ fn table(out: &mut Vec<u8>, fields: &[(usize, Value)]) -> usize {
         out.extend(number.to_le_bytes());
     }
     for (k, (_, value)) in fields.iter().enumerate() {
-        refer(out, at + 4 + 4 * k, value);
+        append_content(out, at + 4 + 4 * k, value);
     }
     at
 }
 
 /// Appends the content that a field refers to, if any.
-fn refer(out: &mut Vec<u8>, field: usize, value: &Value) {
+fn append_content(out: &mut Vec<u8>, field: usize, value: &Value) {
     let mut to = out.len();
     match value {
         Value::Byte(_) | Value::Int(_) => return,

@@ -1,21 +1,21 @@
 //! Reference implementation of the operators in `f64`, pixel by pixel and channel by channel. Twin: `../filters.rs`,
 //! `../kernels.rs`.
 
-use crate::network::tflite::model::{Activation, Kind, Model, Operator, Steps};
+use crate::network::tflite::model::{Activation, Model, Operator, OperatorKind, Strides};
 
 /// Runs a network on a picture `[rows][columns][channels]`.
-pub fn reference(model: &Model, input: &[f32]) -> Vec<f32> {
+pub fn run_reference(model: &Model, input: &[f32]) -> Vec<f32> {
     let mut values: Vec<Vec<f64>> =
-        model.tensors.iter().map(|tensor| wide(tensor.constant.as_deref().unwrap_or_default())).collect();
-    values[model.input] = wide(input);
+        model.tensors.iter().map(|tensor| to_f64(tensor.constant.as_deref().unwrap_or_default())).collect();
+    values[model.input] = to_f64(input);
     for operator in &model.operators {
-        let made = made(model, operator, &values);
+        let made = compute_operator(model, operator, &values);
         values[operator.output] = made.into_iter().map(|value| activate(operator.activation, value)).collect();
     }
     values[model.output].iter().map(|&value| value as f32).collect()
 }
 
-fn wide(values: &[f32]) -> Vec<f64> {
+fn to_f64(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&value| f64::from(value)).collect()
 }
 
@@ -28,7 +28,7 @@ fn activate(activation: Activation, value: f64) -> f64 {
     }
 }
 
-fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
+fn compute_operator(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
     let shape =
         |k: usize| -> [usize; 4] { model.tensors[operator.inputs[k]].shape[..].try_into().expect("four sides") };
     let of = |k: usize| &values[operator.inputs[k]];
@@ -40,14 +40,14 @@ fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
         .flat_map(|y| (0..out_columns).flat_map(move |x| (0..out_channels).map(move |channel| (y, x, channel))));
     let source = of(0);
     match operator.kind {
-        Kind::Convolution(steps) | Kind::Depthwise(steps) => {
-            let is_dense = matches!(operator.kind, Kind::Convolution(_));
+        OperatorKind::Convolution(steps) | OperatorKind::Depthwise(steps) => {
+            let is_dense = matches!(operator.kind, OperatorKind::Convolution(_));
             let [_, down, across, _] = shape(1);
             let before = |count: usize, step: usize, taps: usize, pixels: usize| match steps.is_padded {
                 true => ((count - 1) * step + taps).saturating_sub(pixels) / 2,
                 false => 0,
             };
-            let Steps { down: step_down, across: step_across, .. } = steps;
+            let Strides { down: step_down, across: step_across, .. } = steps;
             let (above, left) =
                 (before(out_rows, step_down, down, rows), before(out_columns, step_across, across, columns));
             places
@@ -71,21 +71,21 @@ fn made(model: &Model, operator: &Operator, values: &[Vec<f64>]) -> Vec<f64> {
                 })
                 .collect()
         }
-        Kind::TransposedConvolution => places
+        OperatorKind::TransposedConvolution => places
             .map(|(y, x, _)| {
                 let four = (y % 2 * 2 + x % 2) * channels;
                 of(2)[0] + (0..channels).map(|k| source[at(y / 2, x / 2, k)] * of(1)[four + k]).sum::<f64>()
             })
             .collect(),
-        Kind::Activation(activation) => source.iter().map(|&value| activate(activation, value)).collect(),
-        Kind::Mean => (0..channels)
+        OperatorKind::Activation(activation) => source.iter().map(|&value| activate(activation, value)).collect(),
+        OperatorKind::Mean => (0..channels)
             .map(|channel| {
                 source.iter().skip(channel).step_by(channels).sum::<f64>() / (source.len() / channels) as f64
             })
             .collect(),
-        Kind::Scale => source.iter().zip(of(1).iter().cycle()).map(|(a, b)| a * b).collect(),
-        Kind::Sum => source.iter().zip(of(1)).map(|(a, b)| a + b).collect(),
-        Kind::Upsample => places
+        OperatorKind::Scale => source.iter().zip(of(1).iter().cycle()).map(|(a, b)| a * b).collect(),
+        OperatorKind::Sum => source.iter().zip(of(1)).map(|(a, b)| a + b).collect(),
+        OperatorKind::Upsample => places
             .map(|(y, x, channel)| {
                 let near = |at: usize, count: usize| {
                     let place = (at as f64 + 0.5) / 2.0 - 0.5;

@@ -17,7 +17,7 @@ use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::compute::Backend;
 use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::DepthError;
-use bokehcam::depth::stereo::check::{Verdict, check};
+use bokehcam::depth::stereo::check::{Verdict, check_pair};
 use bokehcam::depth::stereo::{Effort, MatchError, Pair, Settings};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use bokehcam::look::number::{in_range_parser, parse_positive};
@@ -129,12 +129,12 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
     let pair = Pair { left: &left, color: Some(&color), right: &right };
-    matcher.disparity(pair, &mut disparity).map_err(DepthError::from)?;
+    matcher.compute_disparity(pair, &mut disparity).map_err(DepthError::from)?;
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
 
     // A wrong rectification or order of the pictures shows in the images; the result alone looks plausible.
-    match check(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
-        verdict @ Verdict::RowsOff { .. } => note(format!(
+    match check_pair(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
+        verdict @ Verdict::Misaligned { .. } => note(format!(
             "{verdict}, and the disparity is wrong; {}",
             match rectifier {
                 Some(_) => "the calibration does not match the position of the cameras: calibrate them again",
@@ -142,7 +142,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
             }
         )),
         verdict @ Verdict::Swapped => note(verdict.to_string()),
-        Verdict::Same => log::warn(&Verdict::Same.to_string()),
+        Verdict::Identical => log::warn(&Verdict::Identical.to_string()),
         Verdict::Rectified | Verdict::Unclear { .. } => {}
     }
 

@@ -25,7 +25,7 @@ pub fn check_computing() -> Vec<Finding> {
 #[cfg(feature = "networks")]
 fn check_networks() -> Vec<Finding> {
     use bokehcam::network::{self, Task};
-    let installed = network::installed();
+    let installed = network::installed_networks();
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
     let models = match persons {
@@ -36,7 +36,7 @@ fn check_networks() -> Vec<Finding> {
             "`bokehcam models get` installs one (250 kB); --depth plate needs none",
         ),
     };
-    let runtime = match network::onnx_runtime_installed() {
+    let runtime = match network::onnx_runtime_version() {
         Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
         Err(why) => {
             Finding::note(NETWORKS, "your own networks run on the built-in runtime; ONNX Runtime is faster", why)

@@ -107,7 +107,7 @@ fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Re
         }
         (None, DepthChoice::Defocus) => {
             source::reject_metric_look(look, "defocus gives")?;
-            defocus::depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
+            defocus::estimate_depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
                 let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so its \
                             depth cannot be estimated; use --depth mono or --effect blur";
                 CliError::Usage(what.to_string())

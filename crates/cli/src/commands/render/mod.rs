@@ -24,7 +24,7 @@ use crate::settings::unused::FrameOrigin;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::EdgeAlignment;
-use bokehcam::depth::misfit::Misalignment;
+use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
@@ -224,14 +224,14 @@ impl RenderCommand {
 
 /// Reports a misalignment between a depth map and its picture, and its correction.
 fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
-    let Some(misfit) = Misalignment::measure(map, color) else { return };
-    if misfit.outlines == EdgeAlignment::Unrelated {
+    let Some(misalignment) = Misalignment::measure(map, color) else { return };
+    if misalignment.outlines == EdgeAlignment::Unrelated {
         log::warn(&format!(
             "{file}: none of its outlines match those of the picture: it may be the depth of another picture, or of \
              another camera that is not registered to the colours"
         ));
     } else if look.refine == Refine::Auto {
-        log::note(&format!("{file}: refined, as {misfit}; --refine off uses it unchanged"));
+        log::note(&format!("{file}: refined, as {misalignment}; --refine off uses it unchanged"));
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::DepthMap;
-use bokehcam::network::{KNOWN, Known, Runtime, Task};
+use bokehcam::network::{KNOWN_NETWORKS, KnownNetwork, Runtime, Task};
 
 use super::onnx::matte;
 use super::{WEIGHTS, disc, read, real, written};
@@ -17,7 +17,7 @@ fn only_known_networks_are_installed_and_nothing_of_others_is_replaced() {
     written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
     home.run(&["models", "add", "m.onnx"]).failed(1, &["not a known network"]);
     let listed = home.run(&["models"]).stdout;
-    for known in &KNOWN {
+    for known in &KNOWN_NETWORKS {
         assert!(listed.contains(known.address) && listed.contains(known.sha256), "{}", known.file);
     }
     assert!(!listed.contains("here     /"));
@@ -37,13 +37,13 @@ fn what_is_fetched_is_checked_and_how_is_shown() {
     };
     client(&home, &written(&home.0, "other", b"<html>not found</html>"));
     let ran = get(&[]);
-    let said = ran.failed(1, &["was discarded", KNOWN[0].address]);
+    let said = ran.failed(1, &["was discarded", KNOWN_NETWORKS[0].address]);
     assert!(said.find("curl --fail").unwrap() < said.find("called with").unwrap(), "{said}");
     // An endless download.
     client(&home, Path::new("/dev/zero"));
     get(&["tcmonodepth-small"]).failed(1, &["was discarded"]);
     assert!(!home.path("data").exists());
-    get(&["nothing"]).failed(2, &[KNOWN[0].file]);
+    get(&["nothing"]).failed(2, &[KNOWN_NETWORKS[0].file]);
 }
 
 /// The networks recommended to users.
@@ -56,7 +56,7 @@ fn the_known_networks_run_and_are_installed() {
     let add = |file: &Path| home.run(&["models", "add", file.to_str().unwrap()]);
     let (color, _) = disc(320, 240, (160.0, 120.0), 70.0);
     for file in files() {
-        let Some(known) = Known::of(&fs::read(&file).unwrap()) else { continue };
+        let Some(known) = KnownNetwork::identify(&fs::read(&file).unwrap()) else { continue };
         let (matte, mono) = if known.task == Task::Matte { (Some(&*file), None) } else { (None, Some(&*file)) };
         let mut camera = SingleCamera::open(matte, mono, &Hints::default(), Runtime::BuiltIn)
             .unwrap_or_else(|error| panic!("{}: {error}", known.file));
@@ -67,7 +67,7 @@ fn the_known_networks_run_and_are_installed() {
         add(&file).done();
     }
     let best = real::model(Task::Matte);
-    let known = Known::of(&fs::read(&best).unwrap()).unwrap();
+    let known = KnownNetwork::identify(&fs::read(&best).unwrap()).unwrap();
     let foreign = home.path("data/bokehcam/models").join(known.file);
     fs::write(&foreign, "mine").unwrap();
     assert_eq!((add(&best).code, fs::read_to_string(&foreign).unwrap().as_str()), (1, "mine"));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{KNOWN, Runtime, Task, Tensor, best_in};
+use bokehcam::network::{KNOWN_NETWORKS, Runtime, Task, Tensor, find_best_in};
 use bokehcam::recording::{Options, Recording, Scratch};
 
 use super::read;
@@ -33,7 +33,7 @@ fn data() -> PathBuf {
 
 /// Returns the file of the best known network for a task in the test data.
 pub fn model(task: Task) -> PathBuf {
-    best_in(vec![data().join("models")], task).unwrap()
+    find_best_in(vec![data().join("models")], task).unwrap()
 }
 
 /// A real RGB-D sequence of a turning person.
@@ -127,7 +127,7 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
 
 fn shipped() -> PathBuf {
     let folder = std::env::var_os("TEST_MODELS").expect("TEST_MODELS names the folder of the network");
-    PathBuf::from(folder).join(KNOWN[0].file)
+    PathBuf::from(folder).join(KNOWN_NETWORKS[0].file)
 }
 
 fn load(file: &Path) -> bokehcam::network::Network {
@@ -139,7 +139,7 @@ fn load(file: &Path) -> bokehcam::network::Network {
 fn what_the_package_brings_is_installed_and_sees_nobody_in_a_grey_wall() {
     let home = Home::new();
     home.run(&["models", "add", shipped().to_str().unwrap()]).done();
-    let mut network = load(&home.path("data/bokehcam/models").join(KNOWN[0].file));
+    let mut network = load(&home.path("data/bokehcam/models").join(KNOWN_NETWORKS[0].file));
     let shape = vec![1, 144, 256, 3];
     let mut mask = Vec::new();
     network.run(&[Tensor { values: vec![0.5; 144 * 256 * 3], shape }], &mut mask).unwrap();

@@ -7,7 +7,7 @@ use crate::panel::parts::{Hinted, Number, dropdown, path, remark, switch};
 use crate::services::Browse;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::look::FramingZoom;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -32,12 +32,12 @@ const MIN_ZOOM: f32 = 1.1;
 /// Adds the list of backgrounds.
 pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let kind = match sheet.look.background {
-        Behind::Blur => Kind::Blurred,
-        Behind::Color(_) => Kind::Color,
-        Behind::Picture(_) => Kind::Picture,
+        Background::Blur => Kind::Blurred,
+        Background::Color(_) => Kind::Color,
+        Background::Picture(_) => Kind::Picture,
     };
     let named = match &sheet.state.first_look.background {
-        Behind::Picture(picture) => Some(Behind::Picture(picture.clone())),
+        Background::Picture(picture) => Some(Background::Picture(picture.clone())),
         _ => None,
     };
     let shown = KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name));
@@ -47,8 +47,8 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let chosen = ui.add_enabled_ui(enabled, |ui| dropdown(ui, "Background", &shown, all, &kind)).inner;
     if let Some(chosen) = chosen {
         match (chosen, named) {
-            (Kind::Blurred, _) => sheet.look.background = Behind::Blur,
-            (Kind::Color, _) => sheet.look.background = Behind::Color(GREEN),
+            (Kind::Blurred, _) => sheet.look.background = Background::Blur,
+            (Kind::Color, _) => sheet.look.background = Background::Color(GREEN),
             (Kind::Picture, Some(named)) => sheet.look.background = named,
             (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
         }
@@ -59,17 +59,17 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
 /// Adds the options of the selected background, and auto-framing.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     match sheet.look.background.clone() {
-        Behind::Blur => {}
-        Behind::Picture(picture) => {
+        Background::Blur => {}
+        Background::Picture(picture) => {
             picture.file.iter().for_each(|file| path(ui, &file.display().to_string()));
             sheet.button(ui, "Choose picture…", "Another picture of your own", Action::Browse(Browse::Behind));
         }
-        Behind::Color(mut color) => drop(ui.horizontal(|ui| {
+        Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.hint("Another colour").changed() {
-                sheet.look.background = Behind::Color(color);
+                sheet.look.background = Background::Color(color);
                 sheet.mark_changed(true, "colour behind");
             }
         })),

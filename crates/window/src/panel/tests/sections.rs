@@ -7,7 +7,7 @@ use egui::{Key, Modifiers, pos2};
 use super::{Action, Window, sample};
 use crate::services::Browse;
 use crate::state::{Request, Shown, Source, State, Update};
-use bokehcam::depth::backdrop::{BackgroundPicture, Behind};
+use bokehcam::depth::backdrop::{Background, BackgroundPicture};
 use bokehcam::frame::ColorImage;
 
 #[test]
@@ -54,16 +54,18 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
     assert_eq!(choose(&mut window, "Picture"), [Action::Browse(Browse::Behind)]);
     assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
     choose(&mut window, "Colour");
-    assert!(matches!(window.state.look.background, Behind::Color(_)));
-    let wall =
-        Behind::Picture(Arc::new(BackgroundPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
+    assert!(matches!(window.state.look.background, Background::Color(_)));
+    let wall = Background::Picture(Arc::new(BackgroundPicture {
+        file: Some("wall.jpg".into()),
+        image: ColorImage::new(2, 2),
+    }));
     let request = window.state.apply_update(Update::Behind(wall.clone()));
     assert!(matches!(request, Some(Request::Look(look)) if look.background == wall));
     window.wait(0.1);
     assert!(window.place_of("wall.jpg").is_some());
     assert_eq!(window.click_on("Choose picture…"), [Action::Browse(Browse::Behind)]);
     window.state.apply(Action::Undo);
-    assert!(matches!(window.state.look.background, Behind::Color(_)), "as every other change");
+    assert!(matches!(window.state.look.background, Background::Color(_)), "as every other change");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::keys::GROUPS;
 use crate::state::{Action, DepthMethod, Output, Source, State, Transport, tweak};
 use crate::texts::{self, tests as table};
 use crate::views::Legend;
-use bokehcam::depth::backdrop::Behind;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::plate::Step;
 use bokehcam::look::{Effect, FramingZoom, Strength};
 
@@ -32,7 +32,7 @@ fn windows() -> Vec<Window> {
             state.split = Some(0.5);
         },
         &|state| {
-            (state.look.background, state.look.follow) = (Behind::Color([1, 2, 3]), FramingZoom::from_zoom(2.0));
+            (state.look.background, state.look.follow) = (Background::Color([1, 2, 3]), FramingZoom::from_zoom(2.0));
         },
         &|state| state.help = true,
         &|state| {

@@ -5,7 +5,7 @@ use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
 /// Plays the depth images of a recording in a loop, paired with colour frames by media time.
-pub struct Beside {
+pub struct LoopedRecording {
     recording: Recording,
     scratch: Scratch,
     /// Media time of one loop: from the first frame to the end of the last.
@@ -17,7 +17,7 @@ pub struct Beside {
     map: DepthMap,
 }
 
-impl Beside {
+impl LoopedRecording {
     /// Creates a source from the depth of `recording`; messages call it `name`.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Beside {
     }
 }
 
-impl DepthSource for Beside {
+impl DepthSource for LoopedRecording {
     fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = self.index_at(stamp.time_ns.saturating_add_signed(self.ahead_ns));
         // At a higher colour frame rate, one depth image serves several frames: it is decoded once.
@@ -74,7 +74,7 @@ mod tests {
         let recording = Recording::open(&folder, &Options::default()).unwrap();
         let last = recording.len() - 1;
         let (last_ns, period_ns) = (recording.time_ns(last), recording.period_ns());
-        let beside = Beside::new(recording, "portrait").unwrap();
+        let beside = LoopedRecording::new(recording, "portrait").unwrap();
         let loop_ns = last_ns + period_ns;
         let times_ns = [0, last_ns - 1, last_ns, loop_ns - 1, loop_ns, 3 * loop_ns + last_ns];
         assert!(last > 1);

@@ -11,9 +11,9 @@ pub struct Component {
     /// Number of pixels.
     pub pixels: u32,
     /// Number of pixels that satisfy the predicate.
-    pub found: u32,
+    pub matches: u32,
     /// Whether it touches the border of the picture.
-    pub is_open: bool,
+    pub touches_border: bool,
 }
 
 /// Consecutive pixels of one kind in a row.
@@ -48,8 +48,8 @@ impl Components {
                     parent: component,
                     is_person: same[0],
                     pixels: same.len() as u32,
-                    found: pixels.clone().map(|at| u32::from(predicate(at))).sum(),
-                    is_open: at_side || y == 0 || (y + 1) * width == persons.len(),
+                    matches: pixels.clone().map(|at| u32::from(predicate(at))).sum(),
+                    touches_border: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
                 // Runs above that end before this one are irrelevant to all later ones.
                 above.start +=
@@ -65,7 +65,7 @@ impl Components {
     }
 
     /// Iterates over all components.
-    pub fn all(&self) -> impl Iterator<Item = &Component> {
+    pub fn iter_all(&self) -> impl Iterator<Item = &Component> {
         let roots = self.components.iter().enumerate().filter(|(at, component)| component.parent as usize == *at);
         roots.map(|(_, component)| component)
     }
@@ -73,14 +73,14 @@ impl Components {
     /// Iterates over all runs, with their components.
     pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, &Component)> {
         self.runs.iter().map(|run| {
-            let root = root(&self.components, run.component);
+            let root = find_root(&self.components, run.component);
             (run.pixels.clone(), &self.components[root as usize])
         })
     }
 }
 
 /// Returns the root of a component.
-fn root(components: &[Component], mut component: u32) -> u32 {
+fn find_root(components: &[Component], mut component: u32) -> u32 {
     while components[component as usize].parent != component {
         component = components[component as usize].parent;
     }
@@ -89,13 +89,14 @@ fn root(components: &[Component], mut component: u32) -> u32 {
 
 /// Merges two components and returns the root: the older one, so that chains stay short.
 fn merge(components: &mut [Component], a: u32, b: u32) -> u32 {
-    let (a, b) = (root(components, a), root(components, b));
+    let (a, b) = (find_root(components, a), find_root(components, b));
     let (old, young) = (a.min(b), a.max(b));
     if old != young {
-        let Component { pixels, found, is_open, .. } = components[young as usize];
+        let Component { pixels, matches, touches_border, .. } = components[young as usize];
         components[young as usize].parent = old;
         let all = &mut components[old as usize];
-        (all.pixels, all.found, all.is_open) = (all.pixels + pixels, all.found + found, all.is_open || is_open);
+        (all.pixels, all.matches, all.touches_border) =
+            (all.pixels + pixels, all.matches + matches, all.touches_border || touches_border);
     }
     old
 }
@@ -118,13 +119,15 @@ mod tests {
         let persons: Vec<bool> = picture.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let mut components = Components::default();
         components.find(&persons, 10, |at| at % 10 < 5);
-        let mut found: Vec<_> =
-            components.all().map(|part| (part.is_person, part.pixels, part.found, part.is_open)).collect();
-        found.sort_unstable();
+        let mut matches: Vec<_> = components
+            .iter_all()
+            .map(|part| (part.is_person, part.pixels, part.matches, part.touches_border))
+            .collect();
+        matches.sort_unstable();
         let background = persons.iter().filter(|is| !**is).count() as u32 - 1;
         let left = (0..60).filter(|at| at % 10 < 5 && !persons[*at]).count() as u32;
         assert_eq!(
-            found,
+            matches,
             [
                 (false, 1, 0, false),
                 (false, background, left, true),

@@ -3,9 +3,9 @@
 //! The network's values increase with nearness, but their scale and offset vary from frame to frame. Two anchors in the
 //! picture fix both: the subject, and the farthest surface.
 
-use super::aside::Worker;
-use super::feed::Feed;
-use crate::depth::tap::nearest;
+use super::background_worker::BackgroundWorker;
+use super::picture_network::PictureNetwork;
+use crate::depth::tap::nearest_index;
 use crate::frame::{ColorImage, Mask};
 
 /// Fraction of the sorted values that is ignored at each end.
@@ -13,35 +13,35 @@ const OUTLIERS: f32 = 0.03;
 /// Uncertainty of the network's outlines, in its pixels: within it around a person, the background is unknown.
 const MARGIN_PX: usize = 7;
 /// Radius of the box filter that extends the surroundings behind a person, in pixels.
-const SPREAD_PX: usize = 24;
+const BOX_RADIUS_PX: usize = 24;
 /// Upper bound of the nearness behind a subject, so that it stays background.
-const NEAREST_BEHIND: f32 = 0.9;
+const MAX_BACKGROUND_NEARNESS: f32 = 0.9;
 
 /// Relative depth from frame to frame.
-pub struct Relief {
+pub struct RelativeDepth {
     /// The latest result.
-    found: Found,
+    map: NearnessMap,
     /// `None` while the worker thread has it.
-    finder: Option<Box<Finder>>,
-    worker: Option<Worker<Box<Finder>>>,
+    estimator: Option<Box<DepthEstimator>>,
+    worker: Option<BackgroundWorker<Box<DepthEstimator>>>,
 }
 
 /// The result for one picture.
 #[derive(Default)]
-struct Found {
+struct NearnessMap {
     /// Columns and rows.
     size: (usize, usize),
     /// Relative inverse depth: 1 at the subject, 0 at the farthest surface.
     nearness: Vec<f32>,
     /// Relative inverse depth with the subject removed.
-    behind: Vec<f32>,
+    background: Vec<f32>,
 }
 
 /// Computes relative depth; moved to the worker thread and back.
-struct Finder {
-    feed: Feed,
-    found: Found,
-    outcome: Result<(), String>,
+struct DepthEstimator {
+    picture_network: PictureNetwork,
+    map: NearnessMap,
+    result: Result<(), String>,
     /// The subject's mask in the current picture; empty without a subject.
     mask: Mask,
     /// Mask value of each pixel, at the network's resolution.
@@ -52,12 +52,12 @@ struct Finder {
     line: Vec<f32>,
 }
 
-impl Relief {
-    pub fn new(feed: Feed) -> Self {
-        let finder = Finder {
-            feed,
-            found: Found::default(),
-            outcome: Ok(()),
+impl RelativeDepth {
+    pub fn new(picture_network: PictureNetwork) -> Self {
+        let estimator = DepthEstimator {
+            picture_network,
+            map: NearnessMap::default(),
+            result: Ok(()),
             mask: Mask::default(),
             subject: Vec::new(),
             known: Vec::new(),
@@ -65,116 +65,123 @@ impl Relief {
             sorted: Vec::new(),
             line: Vec::new(),
         };
-        Self { found: Found::default(), finder: Some(Box::new(finder)), worker: None }
+        Self { map: NearnessMap::default(), estimator: Some(Box::new(estimator)), worker: None }
     }
 
     /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
-        self.found.size
+        self.map.size
     }
 
     /// Returns the relative inverse depth of the latest picture: 1 at the subject, 0 at the farthest surface.
     pub fn nearness(&self) -> &[f32] {
-        &self.found.nearness
+        &self.map.nearness
     }
 
     /// Returns the relative inverse depth with the subject removed, below 1.
-    pub fn behind(&self) -> &[f32] {
-        &self.found.behind
+    pub fn background(&self) -> &[f32] {
+        &self.map.background
     }
 
     /// Computes the relative depth of a picture. The subject is in `mask`; without a mask, it is the nearest surface.
     ///
     /// # Errors
-    /// See [`Feed::infer`].
+    /// See [`PictureNetwork::infer`].
     pub fn run(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
         self.collect(true)?;
-        let Some(mut finder) = self.finder.take() else { return Ok(()) };
-        finder.set_picture(color, mask);
-        finder.find();
-        self.store(finder)
+        let Some(mut estimator) = self.estimator.take() else { return Ok(()) };
+        estimator.set_picture(color, mask);
+        estimator.estimate();
+        self.store(estimator)
     }
 
     /// Computes it on the worker thread, once there is a first result: [`Self::collect`] collects it later. Does
     /// nothing while another picture is in progress.
     ///
     /// # Errors
-    /// See [`Feed::infer`].
+    /// See [`PictureNetwork::infer`].
     pub fn run_async(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
-        if self.found.nearness.is_empty() {
+        if self.map.nearness.is_empty() {
             return self.run(color, mask);
         }
         self.collect(false)?;
-        let Some(mut finder) = self.finder.take() else { return Ok(()) };
-        finder.set_picture(color, mask);
+        let Some(mut estimator) = self.estimator.take() else { return Ok(()) };
+        estimator.set_picture(color, mask);
         if self.worker.is_none() {
-            self.worker = Worker::new("inference", |finder: &mut Box<Finder>| finder.find());
+            self.worker =
+                BackgroundWorker::new("inference", |estimator: &mut Box<DepthEstimator>| estimator.estimate());
         }
-        let given = match &self.worker {
-            Some(worker) => worker.submit(finder),
-            None => Err(finder),
+        let submitted = match &self.worker {
+            Some(worker) => worker.submit(estimator),
+            None => Err(estimator),
         };
-        given.or_else(|mut finder| {
-            finder.find();
-            self.store(finder)
+        submitted.or_else(|mut estimator| {
+            estimator.estimate();
+            self.store(estimator)
         })
     }
 
     /// Collects the thread's result if it is done; waits for it if `wait`.
     ///
     /// # Errors
-    /// See [`Feed::infer`].
+    /// See [`PictureNetwork::infer`].
     pub fn collect(&mut self, wait: bool) -> Result<(), String> {
-        match self.worker.as_ref().filter(|_| self.finder.is_none()).map(|worker| worker.collect(wait)).transpose()? {
-            Some(Some(finder)) => self.store(finder),
+        match self
+            .worker
+            .as_ref()
+            .filter(|_| self.estimator.is_none())
+            .map(|worker| worker.collect(wait))
+            .transpose()?
+        {
+            Some(Some(estimator)) => self.store(estimator),
             _ => Ok(()),
         }
     }
 
-    fn store(&mut self, mut finder: Box<Finder>) -> Result<(), String> {
-        let outcome = std::mem::replace(&mut finder.outcome, Ok(()));
-        if outcome.is_ok() {
-            std::mem::swap(&mut self.found, &mut finder.found);
+    fn store(&mut self, mut estimator: Box<DepthEstimator>) -> Result<(), String> {
+        let result = std::mem::replace(&mut estimator.result, Ok(()));
+        if result.is_ok() {
+            std::mem::swap(&mut self.map, &mut estimator.map);
         }
-        self.finder = Some(finder);
-        outcome
+        self.estimator = Some(estimator);
+        result
     }
 }
 
-impl Finder {
+impl DepthEstimator {
     fn set_picture(&mut self, color: &ColorImage, mask: Option<&Mask>) {
-        self.feed.set_picture(color);
+        self.picture_network.set_picture(color);
         match mask {
             Some(mask) => self.mask.clone_from(mask),
             None => self.mask.resize(0, 0),
         }
     }
 
-    fn find(&mut self) {
-        let Self { feed, found: Found { size, nearness, .. }, mask, subject, outcome, .. } = self;
-        let answer = match feed.answer() {
-            Ok(answer) => answer,
+    fn estimate(&mut self) {
+        let Self { picture_network, map: NearnessMap { size, nearness, .. }, mask, subject, result, .. } = self;
+        let output = match picture_network.run() {
+            Ok(output) => output,
             Err(why) => {
-                *outcome = Err(why);
+                *result = Err(why);
                 return;
             }
         };
-        *size = answer.size;
-        let pixels = answer.size.0 * answer.size.1;
+        *size = output.size;
+        let pixels = output.size.0 * output.size.1;
         nearness.clear();
-        nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
+        nearness.extend((0..pixels).map(|pixel| output.at(pixel, 0)));
         subject.clear();
         let of_mask = (mask.width as usize, mask.height as usize);
-        let alpha = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.alpha[nearest(at, answer.size, of_mask)] };
+        let alpha = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.alpha[nearest_index(at, output.size, of_mask)] };
         subject.extend((0..pixels).map(alpha));
-        self.measure();
-        self.extrapolate_behind();
+        self.normalize();
+        self.extrapolate_background();
     }
 
     /// Maps the network's values linearly to nearness: the farthest surface (a low quantile outside of the person) to
     /// 0, the subject (the median of the person, else a high quantile) to 1.
-    fn measure(&mut self) {
-        let Self { found: Found { nearness, .. }, subject: alphas, sorted, .. } = self;
+    fn normalize(&mut self) {
+        let Self { map: NearnessMap { nearness, .. }, subject: alphas, sorted, .. } = self;
         let mut anchor = |quantile: f32, counts: &dyn Fn(usize) -> bool| {
             sorted.clear();
             sorted.extend(nearness.iter().enumerate().filter(|(at, _)| counts(*at)).map(|(_, &value)| value));
@@ -190,10 +197,10 @@ impl Finder {
     }
 
     /// Extrapolates the surroundings behind the subject by normalised convolution.
-    fn extrapolate_behind(&mut self) {
-        let Self { found: Found { size, nearness, behind }, subject, known, spread, line, .. } = self;
+    fn extrapolate_background(&mut self) {
+        let Self { map: NearnessMap { size, nearness, background }, subject, known, spread, line, .. } = self;
         let size = *size;
-        behind.clone_from(nearness);
+        background.clone_from(nearness);
         if subject.iter().all(|&alpha| alpha < 0.5) {
             return;
         }
@@ -201,31 +208,31 @@ impl Finder {
         known.extend(subject.iter().map(|&alpha| f32::from(u8::from(alpha < 0.5))));
         // Near an outline, the values mix both surfaces.
         erode(known, line, size);
-        for (value, known) in behind.iter_mut().zip(&*known) {
+        for (value, known) in background.iter_mut().zip(&*known) {
             *value *= known;
         }
         let total = |plane: &[f32]| plane.iter().sum::<f32>();
-        let elsewhere = total(behind) / total(known).max(1.0);
+        let elsewhere = total(background) / total(known).max(1.0);
         spread.clone_from(known);
-        for plane in [&mut *behind, &mut *spread] {
+        for plane in [&mut *background, &mut *spread] {
             // Two box filters: smooth, and as wide as a person.
             for _ in 0..2 {
-                mean(plane, line, size);
+                box_filter(plane, line, size);
             }
         }
         for at in 0..nearness.len() {
-            behind[at] = match () {
+            background[at] = match () {
                 () if known[at] > 0.0 => nearness[at],
-                () if spread[at] > 1e-3 => behind[at] / spread[at],
+                () if spread[at] > 1e-3 => background[at] / spread[at],
                 () => elsewhere,
             }
-            .min(NEAREST_BEHIND);
+            .min(MAX_BACKGROUND_NEARNESS);
         }
     }
 }
 
 /// Calls `change` with every row of a plane, then with every column.
-fn by_lines(
+fn filter_separably(
     plane: &mut [f32],
     line: &mut Vec<f32>,
     (width, height): (usize, usize),
@@ -245,7 +252,7 @@ fn by_lines(
 
 /// Sets to 0 everything within [`MARGIN_PX`] of a 0.
 fn erode(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
-    by_lines(plane, line, size, |line, set| {
+    filter_separably(plane, line, size, |line, set| {
         let mut last = None;
         for (at, &value) in line.iter().enumerate() {
             if value == 0.0 {
@@ -259,10 +266,10 @@ fn erode(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
     });
 }
 
-/// Applies a box filter of radius [`SPREAD_PX`], rows then columns.
-fn mean(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
-    by_lines(plane, line, size, |line, set| {
-        let (mut sum, radius) = (0.0f64, SPREAD_PX.min(line.len() - 1));
+/// Applies a box filter of radius [`BOX_RADIUS_PX`], rows then columns.
+fn box_filter(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
+    filter_separably(plane, line, size, |line, set| {
+        let (mut sum, radius) = (0.0f64, BOX_RADIUS_PX.min(line.len() - 1));
         line[..radius].iter().for_each(|&value| sum += f64::from(value));
         for at in 0..line.len() {
             sum += line.get(at + radius).map_or(0.0, |&value| f64::from(value));
@@ -287,9 +294,9 @@ mod tests {
         assert_eq!(plane[20], 0.0, "rows above and below, too");
         let mut wide = vec![0.0; 101];
         wide[50] = 49.0;
-        mean(&mut wide, &mut Vec::new(), (101, 1));
+        box_filter(&mut wide, &mut Vec::new(), (101, 1));
         for (x, value) in wide.iter().enumerate() {
-            let expected = if x.abs_diff(50) <= SPREAD_PX { 1.0 } else { 0.0 };
+            let expected = if x.abs_diff(50) <= BOX_RADIUS_PX { 1.0 } else { 0.0 };
             assert!((value - expected).abs() < 1e-5, "{x}: {value}");
         }
     }

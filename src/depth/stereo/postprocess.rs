@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
-use super::border::Border;
+use super::border::BorderFiller;
 use super::color_similarity::{ColorSimilarity, Colors};
-use super::fattening::Fattening;
+use super::fattening::FatteningCorrection;
 use super::fixed::{FILLED, ONE};
 use super::gaps;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
@@ -15,9 +15,9 @@ use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 /// Post-processes maps of one size; owns its buffers.
 pub struct PostProcessor {
     width: usize,
-    border: Border,
+    border: BorderFiller,
     similarity: ColorSimilarity,
-    fattening: Fattening,
+    fattening: FatteningCorrection,
     /// The median of the filled map.
     smooth: Vec<u16>,
     /// A flag per row, with which [`DisjointParts`] ensures that only one thread writes it.
@@ -30,9 +30,9 @@ impl PostProcessor {
     pub fn new((width, height): (usize, usize)) -> Self {
         Self {
             width,
-            border: Border::new((width, height)),
+            border: BorderFiller::new((width, height)),
             similarity: ColorSimilarity::default(),
-            fattening: Fattening::new((width, height)),
+            fattening: FatteningCorrection::new((width, height)),
             smooth: vec![0; width * height],
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
@@ -41,7 +41,7 @@ impl PostProcessor {
 
     /// Fills unknown pixels of `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above
     /// 0.
-    pub fn fill(
+    pub fn postprocess(
         &mut self,
         map: &mut [u16],
         luma: &[u8],
@@ -53,22 +53,22 @@ impl PostProcessor {
         let (width, arch) = (*width, *arch);
         border.fill(map, luma, width);
         if let Some(colors) = colors {
-            similarity.correct(map, width, border.first(), colors);
+            similarity.correct(map, width, border.first_known_columns(), colors);
         }
         // Paths with too large changes of brightness have reached no pixel.
-        for (row, &first) in map.chunks_exact_mut(width).zip(border.first()) {
+        for (row, &first) in map.chunks_exact_mut(width).zip(border.first_known_columns()) {
             gaps::fill_row(&mut row[..=first], 0);
         }
         gaps::fill_empty_rows(map, width);
         // The first median removes outliers, which have no colour edge; the second smooths the per-pixel decisions.
-        median_map(map, width, (workers, arch), taken, smooth, |fixed| fixed);
+        median_filter(map, width, (workers, arch), taken, smooth, |fixed| fixed);
         fattening.correct(smooth, map, luma, colors, workers);
-        median_map(map, width, (workers, arch), taken, px, to_px);
+        median_filter(map, width, (workers, arch), taken, px, fixed_to_px);
     }
 }
 
 /// Writes the 3x3 median of each pixel of `map` to `out`, converted by `to`.
-fn median_map<T: Send>(
+fn median_filter<T: Send>(
     map: &[u16],
     width: usize,
     (workers, arch): (&mut ThreadPool, Arch),
@@ -104,7 +104,7 @@ impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
             for (k, row) in [above, here, below].into_iter().enumerate() {
                 (nine[3 * k], nine[3 * k + 1], nine[3 * k + 2]) = (row[before], row[x], row[after]);
             }
-            to(median_known(nine))
+            to(median_of_disparities(nine))
         };
         (out[0], out[width - 1]) = (at(0), at(width - 1));
         if width < 3 {
@@ -112,9 +112,10 @@ impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
         }
         // Slices of equal length need no bounds checks, so that this loop becomes vector code.
         let inner = width - 2;
-        let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
+        let (above, here, below) =
+            (shifted_columns(above, inner), shifted_columns(here, inner), shifted_columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
-            *out = to(median_known([
+            *out = to(median_of_disparities([
                 above[0][x],
                 above[1][x],
                 above[2][x],
@@ -132,25 +133,25 @@ impl<T, F: Fn(u16) -> T> WithSimd for Median<'_, T, F> {
 /// Returns `row` from its first, second and third column on: the left neighbours, pixels and right neighbours of
 /// `length` inner pixels.
 #[inline(always)]
-fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
+fn shifted_columns(row: &[u16], length: usize) -> [&[u16]; 3] {
     [&row[..length], &row[1..=length], &row[2..length + 2]]
 }
 
 /// Returns the median of nine disparities, ignoring the mark of filled ones.
 #[inline(always)]
-fn median_known(nine: [u16; 9]) -> u16 {
-    median(nine.map(|d| d & !FILLED))
+fn median_of_disparities(nine: [u16; 9]) -> u16 {
+    median_of_nine(nine.map(|d| d & !FILLED))
 }
 
 /// Converts fixed point to pixels, above 0: 0 would mean unknown, and a disparity of 0 is known.
 #[inline(always)]
-fn to_px(fixed: u16) -> f32 {
+fn fixed_to_px(fixed: u16) -> f32 {
     f32::from(if fixed > 1 { fixed } else { 1 }) / f32::from(ONE)
 }
 
 /// Returns the median of nine with 19 exchanges (Paeth, *Median finding on a 3x3 grid*, Graphics Gems, 1990).
 #[inline(always)]
-fn median(nine: [u16; 9]) -> u16 {
+fn median_of_nine(nine: [u16; 9]) -> u16 {
     let [mut a, mut b, mut c, mut d, mut e, mut f, mut g, mut h, mut i] = nine;
     // Unrolled: a loop over indices would not become vector code.
     macro_rules! exchange {
@@ -177,7 +178,7 @@ mod tests {
             });
             let mut sorted = nine;
             sorted.sort_unstable();
-            assert_eq!(median(nine), sorted[4], "{nine:?}");
+            assert_eq!(median_of_nine(nine), sorted[4], "{nine:?}");
         }
     }
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 pub use serve::serve;
 
-use super::{Failure, Network, Runtime};
+use super::{LoadFailure, Network, Runtime};
 use process::Process;
 
 /// The argument with which the program is started to call [`serve`].
@@ -34,12 +34,12 @@ static IS_EXITING: AtomicBool = AtomicBool::new(false);
 
 /// Runs unknown networks in separate processes from now on. Only for a program that calls [`serve`] when started with
 /// [`ARGUMENT`]; in others, networks can use any amount of memory and time.
-pub fn make_possible() {
+pub fn enable() {
     IS_ENABLED.store(true, Ordering::Relaxed);
 }
 
 /// Shortens all waits, because the program is about to exit.
-pub fn hurry() {
+pub fn shorten_timeouts() {
     IS_EXITING.store(true, Ordering::Relaxed);
 }
 
@@ -48,7 +48,8 @@ pub(super) fn is_enabled() -> bool {
 }
 
 /// Starts a process and loads a network in it.
-pub(super) fn load(bytes: &[u8], runtime: Runtime) -> Result<Network, Failure> {
-    let process = Process::start().map_err(|error| Failure::Refused(format!("its process does not start: {error}")))?;
+pub(super) fn load(bytes: &[u8], runtime: Runtime) -> Result<Network, LoadFailure> {
+    let process =
+        Process::start().map_err(|error| LoadFailure::Refused(format!("its process does not start: {error}")))?;
     process.load(bytes, runtime)
 }

@@ -2,8 +2,8 @@
 
 /// Maximum distance between two measurements of one subject at rest, in dioptres, and its maximum speed, in dioptres a
 /// second.
-const SAME: f32 = 0.12;
-const SPEED: f32 = 2.0;
+const SAME_SUBJECT: f32 = 0.12;
+const MAX_SPEED: f32 = 2.0;
 /// Upper bound of the time for which motion is assumed: after a longer gap, two subjects could not be told apart.
 const MAX_GAP_S: f32 = 0.1;
 /// Another subject is chosen after this time and this number of consecutive maps, so that neither a passer-by nor a
@@ -12,21 +12,21 @@ const MIN_DURATION_NS: u64 = 400_000_000;
 const MIN_MAPS: u32 = 3;
 
 /// Returns how far a subject may have moved between two times, in dioptres.
-pub fn tolerance(from_ns: u64, to_ns: u64) -> f32 {
+pub fn motion_tolerance(from_ns: u64, to_ns: u64) -> f32 {
     let elapsed_s = to_ns.saturating_sub(from_ns) as f32 / 1e9;
-    SAME + SPEED * elapsed_s.min(MAX_GAP_S)
+    SAME_SUBJECT + MAX_SPEED * elapsed_s.min(MAX_GAP_S)
 }
 
 /// The hysteresis' state: the current subject and its rival.
 #[derive(Debug, Default)]
 pub struct Hysteresis {
-    subject: Option<Seen>,
+    subject: Option<Candidate>,
     /// Another subject, found since the current one was last found.
-    rival: Option<Seen>,
+    rival: Option<Candidate>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct Candidate {
     dioptres: f32,
     time_ns: u64,
     /// The last time it was not found, and the number of maps in which it was.
@@ -34,9 +34,9 @@ struct Seen {
     maps: u32,
 }
 
-impl Seen {
+impl Candidate {
     fn is_same(&self, dioptres: f32, time_ns: u64) -> bool {
-        (dioptres - self.dioptres).abs() <= tolerance(self.time_ns, time_ns)
+        (dioptres - self.dioptres).abs() <= motion_tolerance(self.time_ns, time_ns)
     }
 
     fn update(self, dioptres: f32, time_ns: u64) -> Self {
@@ -45,10 +45,10 @@ impl Seen {
 }
 
 impl Hysteresis {
-    /// Returns the distance to focus on, in dioptres, given the subject `found` in a map without memory. `stays`
+    /// Returns the distance to focus on, in dioptres, given the subject `found` in a map without memory. `find_near`
     /// returns the distance of a remaining subject near a given one, if there is any.
-    pub fn choose(&mut self, found: f32, stays: impl Fn(f32) -> Option<f32>, time_ns: u64) -> f32 {
-        let new = |since_ns| Seen { dioptres: found, time_ns, since_ns, maps: 1 };
+    pub fn choose_subject(&mut self, found: f32, find_near: impl Fn(f32) -> Option<f32>, time_ns: u64) -> f32 {
+        let new = |since_ns| Candidate { dioptres: found, time_ns, since_ns, maps: 1 };
         let Some(subject) = self.subject else {
             self.subject = Some(new(time_ns));
             return found;
@@ -67,9 +67,9 @@ impl Hysteresis {
             return found;
         }
         self.rival = Some(rival);
-        let dioptres = stays(subject.dioptres).filter(|&dioptres| subject.is_same(dioptres, time_ns));
+        let dioptres = find_near(subject.dioptres).filter(|&dioptres| subject.is_same(dioptres, time_ns));
         // The time while it was not found does not widen the tolerance.
-        let now = Seen { dioptres: dioptres.unwrap_or(subject.dioptres), time_ns, ..subject };
+        let now = Candidate { dioptres: dioptres.unwrap_or(subject.dioptres), time_ns, ..subject };
         self.subject = Some(now);
         now.dioptres
     }
@@ -84,7 +84,7 @@ mod tests {
     /// Returns the distances chosen for these found ones, one map every `step_ms`; all of them remain present.
     fn chosen(found: &[f32], step_ms: u64) -> Vec<f32> {
         let mut hysteresis = Hysteresis::default();
-        let mut choose = |(map, &found): (u64, &f32)| hysteresis.choose(found, Some, map * step_ms * MS);
+        let mut choose = |(map, &found): (u64, &f32)| hysteresis.choose_subject(found, Some, map * step_ms * MS);
         (0..).zip(found).map(&mut choose).collect()
     }
 

@@ -1,9 +1,9 @@
-//! The passes that post-process a map: remove islands and fill gaps.
+//! The passes that post-process a map: remove speckles and fill gaps.
 //!
-//! Islands are connected components, found by label equivalence with union-find in the labels: runs of rows first,
-//! which are then joined from row to row by atomic minima (after Komura, *GPU-based cluster-labeling algorithm without
-//! the use of conventional iteration*, Computer Physics Communications, 2015). Whatever the order, the root of an
-//! island is its first pixel that begins a run.
+//! Speckles are small connected components, found by label equivalence with union-find in the labels: runs of rows
+//! first, which are then joined from row to row by atomic minima (after Komura, *GPU-based cluster-labeling algorithm
+//! without the use of conventional iteration*, Computer Physics Communications, 2015). Whatever the order, the root of
+//! a component is its first pixel that begins a run.
 
 use super::shaders::{self, Constants, linear_workgroups};
 use crate::compute::device::{Device, Pass};
@@ -15,9 +15,9 @@ pub struct Scratch<'a> {
     pub filled: &'a wgpu::Buffer,
 }
 
-/// Returns the passes that remove the islands of `map`, a word per pixel, and write it with its gaps filled to `words`,
-/// two pixels per word.
-pub fn passes(
+/// Returns the passes that remove the speckles of `map`, a word per pixel, and write it with its gaps filled to
+/// `words`, two pixels per word.
+pub fn create_passes(
     device: &Device,
     (width, height): (usize, usize),
     constants: &Constants,

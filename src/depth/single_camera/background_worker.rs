@@ -4,13 +4,13 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_cha
 use std::thread::{self, JoinHandle};
 
 /// A worker thread that processes one task at a time: submit, process, return.
-pub struct Worker<T> {
+pub struct BackgroundWorker<T> {
     to: Option<SyncSender<T>>,
     from: Receiver<T>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl<T: Send + 'static> Worker<T> {
+impl<T: Send + 'static> BackgroundWorker<T> {
     /// Starts a thread called `name` that runs `work` on each task; `None` if no thread can be created.
     pub fn new(name: &str, work: fn(&mut T)) -> Option<Self> {
         let ((to, tasks), (done, from)) = (sync_channel::<T>(1), sync_channel(1));
@@ -51,7 +51,7 @@ impl<T: Send + 'static> Worker<T> {
     }
 }
 
-impl<T> Drop for Worker<T> {
+impl<T> Drop for BackgroundWorker<T> {
     /// Waits for the current task: a runtime must not be active while the program exits.
     fn drop(&mut self) {
         self.to = None;
@@ -76,26 +76,26 @@ mod tests {
             thread::sleep(Duration::from_millis(100));
             IS_DONE.store(true, Ordering::Relaxed);
         };
-        let aside = Worker::new("test", work).unwrap();
-        aside.submit(()).unwrap();
-        drop(aside);
+        let background_worker = BackgroundWorker::new("test", work).unwrap();
+        background_worker.submit(()).unwrap();
+        drop(background_worker);
         assert!(IS_DONE.load(Ordering::Relaxed));
     }
 
     #[test]
     fn tasks_come_back_done_and_a_thread_that_died_is_told() {
-        let aside = Worker::new("test", |task: &mut i32| {
+        let background_worker = BackgroundWorker::new("test", |task: &mut i32| {
             assert!(*task > 0, "this test's own");
             *task *= 2;
         })
         .unwrap();
-        assert_eq!(aside.collect(false), Ok(None));
+        assert_eq!(background_worker.collect(false), Ok(None));
         for task in [21, 4] {
-            aside.submit(task).unwrap();
-            assert_eq!(aside.collect(true), Ok(Some(2 * task)));
+            background_worker.submit(task).unwrap();
+            assert_eq!(background_worker.collect(true), Ok(Some(2 * task)));
         }
-        aside.submit(0).unwrap();
-        assert!(aside.collect(true).is_err());
-        assert_eq!(aside.submit(1), Err(1));
+        background_worker.submit(0).unwrap();
+        assert!(background_worker.collect(true).is_err());
+        assert_eq!(background_worker.submit(1), Err(1));
     }
 }

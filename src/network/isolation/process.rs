@@ -8,9 +8,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::message::{Ports, Reply, Request, receive, receive_values, send, send_values, shapes};
+use super::message::{Ports, Reply, Request, receive, receive_values, send, send_values, tensor_shapes};
 use super::{ARGUMENT, IS_EXITING, LOAD_TIMEOUT, MAX_MEMORY_BYTES, RUN_TIMEOUT};
-use crate::network::{Engine, Failure, Network, Runtime, Tensor, one_line};
+use crate::network::{Engine, LoadFailure, Network, Runtime, Tensor, to_one_line};
 
 /// Interval at which a wait is checked for its end.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -47,40 +47,40 @@ impl Process {
         Ok(Self { child, stream, outputs: 0, failed: None, buffer: Vec::new() })
     }
 
-    pub fn load(mut self, content: &[u8], runtime: Runtime) -> Result<Network, Failure> {
+    pub fn load(mut self, content: &[u8], runtime: Runtime) -> Result<Network, LoadFailure> {
         let request = Request::Load { runtime: runtime.name().to_owned(), bytes: content.len() };
         let reply = self.exchange(LOAD_TIMEOUT, |stream, _| {
             send(stream, &request)?;
             stream.write_all(content)?;
             receive(stream)
         });
-        match reply.map_err(Failure::Refused)? {
+        match reply.map_err(LoadFailure::Refused)? {
             Reply::Loaded(Ports { inputs, outputs, runtime }) => {
                 self.outputs = outputs.len();
                 Ok(Network { engine: Box::new(self), inputs, outputs, runtime })
             }
             Reply::NotLoaded(failure) => Err(failure),
-            Reply::Ran(_) | Reply::Failed(_) => Err(Failure::Refused(OUT_OF_TURN.to_owned())),
+            Reply::Ran(_) | Reply::Failed(_) => Err(LoadFailure::Refused(UNEXPECTED_ANSWER.to_owned())),
         }
     }
 
-    /// Exchanges messages within `patience`. Any failure, not only a timeout, kills the process, and later calls return
+    /// Exchanges messages within `timeout`. Any failure, not only a timeout, kills the process, and later calls return
     /// the same error.
     fn exchange<T>(
         &mut self,
-        patience: Duration,
-        talk: impl FnOnce(&mut TimedStream, &mut Vec<u8>) -> io::Result<T>,
+        timeout: Duration,
+        communicate: impl FnOnce(&mut TimedStream, &mut Vec<u8>) -> io::Result<T>,
     ) -> Result<T, String> {
         if let Some(why) = &self.failed {
             return Err(why.clone());
         }
-        let mut stream = TimedStream { stream: &self.stream, until: Instant::now() + patience, is_exiting: false };
-        talk(&mut stream, &mut self.buffer).map_err(|error| {
+        let mut stream = TimedStream { stream: &self.stream, deadline: Instant::now() + timeout, is_exiting: false };
+        communicate(&mut stream, &mut self.buffer).map_err(|error| {
             let why = match error.kind() {
                 ErrorKind::TimedOut if stream.is_exiting => "it gave no answer before the program ended".to_owned(),
-                ErrorKind::TimedOut => format!("it gave no answer in {} s", patience.as_secs_f32()),
+                ErrorKind::TimedOut => format!("it gave no answer in {} s", timeout.as_secs_f32()),
                 ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => self.describe_end(),
-                _ => one_line(error),
+                _ => to_one_line(error),
             };
             self.kill();
             self.failed.insert(why).clone()
@@ -108,20 +108,20 @@ impl Process {
     }
 }
 
-const OUT_OF_TURN: &str = "its process sent an unexpected answer";
+const UNEXPECTED_ANSWER: &str = "its process sent an unexpected answer";
 
 impl Engine for Process {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
         let count = self.outputs;
         self.exchange(RUN_TIMEOUT, |stream, buffer| {
-            send(stream, &Request::Run(shapes(inputs)))?;
+            send(stream, &Request::Run(tensor_shapes(inputs)))?;
             send_values(stream, inputs, buffer)?;
             match receive(stream)? {
                 Reply::Ran(sizes) if sizes.len() == count => {
                     receive_values(stream, sizes, outputs, buffer).map(|()| Ok(()))
                 }
                 Reply::Failed(why) => Ok(Err(why)),
-                _ => Err(io::Error::new(ErrorKind::InvalidData, OUT_OF_TURN)),
+                _ => Err(io::Error::new(ErrorKind::InvalidData, UNEXPECTED_ANSWER)),
             }
         })?
     }
@@ -136,7 +136,7 @@ impl Drop for Process {
 /// A stream with a time limit, which is shortened when the program is about to exit.
 struct TimedStream<'a> {
     stream: &'a UnixStream,
-    until: Instant,
+    deadline: Instant,
     is_exiting: bool,
 }
 
@@ -150,9 +150,9 @@ impl TimedStream<'_> {
             }
             if !self.is_exiting && IS_EXITING.load(Ordering::Relaxed) {
                 self.is_exiting = true;
-                self.until = self.until.min(Instant::now() + EXIT_TIMEOUT);
+                self.deadline = self.deadline.min(Instant::now() + EXIT_TIMEOUT);
             }
-            if Instant::now() >= self.until {
+            if Instant::now() >= self.deadline {
                 return Err(ErrorKind::TimedOut.into());
             }
         }
@@ -179,9 +179,9 @@ impl Write for TimedStream<'_> {
 mod tests {
     use super::*;
 
-    fn asked(command: &mut Command, patience: Duration) -> (Process, String) {
+    fn asked(command: &mut Command, timeout: Duration) -> (Process, String) {
         let mut process = Process::spawn(command).unwrap();
-        let why = process.exchange(patience, |stream, _| receive::<Reply>(stream)).unwrap_err();
+        let why = process.exchange(timeout, |stream, _| receive::<Reply>(stream)).unwrap_err();
         (process, why)
     }
 

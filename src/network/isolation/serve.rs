@@ -10,9 +10,9 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Resource, Signal, getpid, getrlimit, kill_process, setrlimit};
 
 use super::MAX_MEMORY_BYTES;
-use super::message::{Ports, Reply, Request, receive, receive_values, send, send_values, shapes};
+use super::message::{Ports, Reply, Request, receive, receive_values, send, send_values, tensor_shapes};
 use crate::names;
-use crate::network::{self, Failure, Network, load_in_process};
+use crate::network::{self, LoadFailure, Network, load_in_process};
 
 /// Loads and runs a network for the process at the other end of standard input, until that process closes it; exits at
 /// once if that process dies.
@@ -76,7 +76,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                 if send(&mut stream, &reply).is_err_and(|error| error.kind() == ErrorKind::InvalidData) {
                     send(
                         &mut stream,
-                        &Reply::NotLoaded(Failure::Refused(
+                        &Reply::NotLoaded(LoadFailure::Refused(
                             "it has too many inputs or \
                                                                           outputs"
                                 .to_owned(),
@@ -88,7 +88,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                 receive_values(&mut stream, sizes, &mut inputs, &mut buffer)?;
                 match network.run(&inputs, &mut outputs) {
                     Ok(()) => {
-                        send(&mut stream, &Reply::Ran(shapes(&outputs)))?;
+                        send(&mut stream, &Reply::Ran(tensor_shapes(&outputs)))?;
                         send_values(&mut stream, &outputs, &mut buffer)?;
                     }
                     Err(why) => send(&mut stream, &Reply::Failed(why))?,

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::network::{Failure, MAX_VALUES, Port, Tensor};
+use crate::network::{LoadFailure, MAX_VALUES, Port, Tensor};
 
 /// Maximum length of a line; names of ports and sizes are short.
 const MAX_LINE_BYTES: u32 = 1 << 20;
@@ -23,7 +23,7 @@ pub enum Request {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Reply {
     Loaded(Ports),
-    NotLoaded(Failure),
+    NotLoaded(LoadFailure),
     /// The outputs have these shapes; their values follow.
     Ran(Vec<Vec<usize>>),
     Failed(String),
@@ -63,7 +63,7 @@ pub fn receive<T: DeserializeOwned>(from: &mut impl Read) -> io::Result<T> {
     Ok(serde_json::from_slice(&line)?)
 }
 
-pub fn shapes(tensors: &[Tensor]) -> Vec<Vec<usize>> {
+pub fn tensor_shapes(tensors: &[Tensor]) -> Vec<Vec<usize>> {
     tensors.iter().map(|tensor| tensor.shape.clone()).collect()
 }
 

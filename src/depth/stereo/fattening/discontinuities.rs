@@ -16,13 +16,13 @@ const NEAR_SIDE_PX: usize = 4;
 const FAR_SIDE_PX: usize = 2;
 
 /// No other surface: compares as farther than any.
-pub const NONE: u16 = u16::MAX;
+pub const NO_OTHER_SIDE: u16 = u16::MAX;
 
 /// The uncertain pixels.
 pub struct UncertainPixels {
     width: usize,
-    /// The disparity beyond the nearest discontinuity, or [`NONE`].
-    others: Vec<u16>,
+    /// The disparity beyond the nearest discontinuity, or [`NO_OTHER_SIDE`].
+    other_sides: Vec<u16>,
     /// Distance to that discontinuity in px: 1 beside it.
     distances_px: Vec<u8>,
 }
@@ -30,34 +30,37 @@ pub struct UncertainPixels {
 impl UncertainPixels {
     /// Allocates for maps of this size.
     pub fn new((width, height): (usize, usize)) -> Self {
-        Self { width, others: vec![NONE; width * height], distances_px: vec![0; width * height] }
+        Self { width, other_sides: vec![NO_OTHER_SIDE; width * height], distances_px: vec![0; width * height] }
     }
 
-    /// Returns for each pixel the disparity beyond the nearest discontinuity, or [`NONE`].
-    pub fn others(&self) -> &[u16] {
-        &self.others
+    /// Returns for each pixel the disparity beyond the nearest discontinuity, or [`NO_OTHER_SIDE`].
+    pub fn other_sides(&self) -> &[u16] {
+        &self.other_sides
     }
 
     /// Finds the pixels beside the discontinuities of `map`.
     pub fn find(&mut self, map: &[u16], workers: &mut ThreadPool, arch: Arch) {
-        let Self { width, others, distances_px } = self;
+        let Self { width, other_sides, distances_px } = self;
         let width = *width;
         let height = map.len() / width;
         let bands = Bands::new(height, 1, workers);
-        let items = bands.rows().zip(bands.split(others, width)).zip(bands.split(distances_px, width));
-        workers.run_each(items, &|((rows, others), distances_px)| {
-            others.fill(NONE);
+        let items = bands.rows().zip(bands.split(other_sides, width)).zip(bands.split(distances_px, width));
+        workers.run_each(items, &|((rows, other_sides), distances_px)| {
+            other_sides.fill(NO_OTHER_SIDE);
             distances_px.fill(u8::MAX);
             let first = rows.start;
-            let mut band = Band { map, width, first, rows: rows.len(), others, distances_px };
+            let mut band = Band { map, width, first, rows: rows.len(), other_sides, distances_px };
             for y in rows.clone() {
                 let row = &map[y * width..(y + 1) * width];
-                arch.dispatch(DepthSteps { rows: [&row[..width - 1], &row[1..]], at: |x| band.mark((x, y), (1, 0)) });
+                arch.dispatch(DepthSteps {
+                    rows: [&row[..width - 1], &row[1..]],
+                    at: |x| band.mark_both_sides((x, y), (1, 0)),
+                });
             }
             // Discontinuities between rows outside the band may mark rows within it.
             for y in rows.start.saturating_sub(NEAR_SIDE_PX)..(rows.end + NEAR_SIDE_PX).min(height) - 1 {
                 let (above, below) = map[y * width..(y + 2) * width].split_at(width);
-                arch.dispatch(DepthSteps { rows: [above, below], at: |x| band.mark((x, y), (0, 1)) });
+                arch.dispatch(DepthSteps { rows: [above, below], at: |x| band.mark_both_sides((x, y), (0, 1)) });
             }
         });
     }
@@ -79,15 +82,15 @@ impl<F: FnMut(usize)> WithSimd for DepthSteps<'_, F> {
         for (k, (one, two)) in one.0.iter().zip(two.0).enumerate() {
             // Most chunks have no discontinuity; the maximum is vector code.
             if one.iter().zip(two).map(apart).fold(0, u16::max) > MIN_DEPTH_STEP {
-                self.each(CHUNK * k, one, two);
+                self.scan_pairs(CHUNK * k, one, two);
             }
         }
-        self.each(CHUNK * one.0.len(), one.1, two.1);
+        self.scan_pairs(CHUNK * one.0.len(), one.1, two.1);
     }
 }
 
 impl<F: FnMut(usize)> DepthSteps<'_, F> {
-    fn each(&mut self, first: usize, one: &[u16], two: &[u16]) {
+    fn scan_pairs(&mut self, first: usize, one: &[u16], two: &[u16]) {
         for (x, _) in one.iter().zip(two).enumerate().filter(|(_, (a, b))| a.abs_diff(**b) > MIN_DEPTH_STEP) {
             (self.at)(first + x);
         }
@@ -101,13 +104,13 @@ struct Band<'a> {
     /// The first row of the band, and the number of its rows.
     first: usize,
     rows: usize,
-    others: &'a mut [u16],
+    other_sides: &'a mut [u16],
     distances_px: &'a mut [u8],
 }
 
 impl Band<'_> {
     /// Marks the pixels on both sides of the discontinuity between a pixel and the next one in direction `(dx, dy)`.
-    fn mark(&mut self, (x, y): (usize, usize), (dx, dy): (usize, usize)) {
+    fn mark_both_sides(&mut self, (x, y): (usize, usize), (dx, dy): (usize, usize)) {
         let after = (x + dx, y + dy);
         let (one, two) = (self.map[y * self.width + x], self.map[after.1 * self.width + after.0]);
         let range_px = |own: u16, other: u16| if own > other { NEAR_SIDE_PX } else { FAR_SIDE_PX };
@@ -134,7 +137,7 @@ impl Band<'_> {
         if (self.first..self.first + self.rows).contains(&y) {
             let at = (y - self.first) * self.width + x;
             if self.distances_px[at] > step as u8 + 1 {
-                (self.distances_px[at], self.others[at]) = (step as u8 + 1, other);
+                (self.distances_px[at], self.other_sides[at]) = (step as u8 + 1, other);
             }
         }
         true

@@ -2,7 +2,7 @@
 
 use crate::frame::ColorImage;
 use crate::frame::scale::Scale;
-use crate::network::{Loaded, Network, Port, Scaling, Task, Tensor};
+use crate::network::{LoadedNetwork, Network, Port, Scaling, Task, Tensor};
 
 /// Maximum side of a network's input picture, in pixels.
 const MAX_SIDE: usize = 1024;
@@ -17,63 +17,63 @@ pub struct Hints {
 }
 
 /// A network with a picture input.
-pub struct Feed {
+pub struct PictureNetwork {
     network: Network,
     /// Columns and rows of the input picture.
     size: (usize, usize),
     /// Whether the input is planar (NCHW) or interleaved (NHWC).
-    planes: bool,
+    is_planar: bool,
     scaling: Scaling,
     bgr: bool,
     /// Index of the picture input, and of the output that is used.
     picture: usize,
-    answer: usize,
+    output: usize,
     /// Recurrent states: pairs of an input and the output that feeds it for the next picture.
-    memory: Vec<(usize, usize)>,
+    recurrent_states: Vec<(usize, usize)>,
     inputs: Vec<Tensor>,
     outputs: Vec<Tensor>,
     scale: Scale,
     row: Vec<u16>,
-    small: Vec<u8>,
+    scaled: Vec<u8>,
 }
 
 /// A network's output: one or two channels, of the network's own size.
 #[derive(Clone, Copy, Debug)]
-pub struct Answer<'a> {
+pub struct NetworkOutput<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
     /// Numbers per pixel.
     pub channels: usize,
     values: &'a [f32],
-    planes: bool,
+    is_planar: bool,
 }
 
-impl Answer<'_> {
+impl NetworkOutput<'_> {
     /// Returns the number of a channel at a pixel.
     #[inline(always)]
     pub fn at(&self, pixel: usize, channel: usize) -> f32 {
         let pixels = self.size.0 * self.size.1;
-        self.values[if self.planes { channel * pixels + pixel } else { pixel * self.channels + channel }]
+        self.values[if self.is_planar { channel * pixels + pixel } else { pixel * self.channels + channel }]
     }
 }
 
-impl Feed {
+impl PictureNetwork {
     /// Finds the inputs and outputs of a network.
     ///
     /// # Errors
     /// The network does not take exactly one picture, takes other inputs than recurrent states and ratios, or has no
     /// usable output.
-    pub fn new(Loaded { network, known }: Loaded, task: Task, hints: &Hints) -> Result<Self, String> {
+    pub fn new(LoadedNetwork { network, known }: LoadedNetwork, task: Task, hints: &Hints) -> Result<Self, String> {
         let inputs = &network.inputs;
-        let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
+        let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channel_axis(&inputs[k], &[3]).is_some()).collect();
         let &[picture] = pictures.as_slice() else {
             return Err(format!(
                 "{} of its inputs are pictures of three channels, and exactly one is needed",
                 pictures.len()
             ));
         };
-        let planes = channels_at(&inputs[picture], &[3]) == Some(1);
-        let sides = if planes { [3, 2] } else { [2, 1] };
+        let is_planar = channel_axis(&inputs[picture], &[3]) == Some(1);
+        let sides = if is_planar { [3, 2] } else { [2, 1] };
         // For a variable input size: small, and divisible by the usual strides of networks.
         let usual = match task {
             Task::Matte => [256, 144],
@@ -87,25 +87,25 @@ impl Feed {
             ));
         }
         let outputs = &network.outputs;
-        let answers = |named: bool| {
+        let find_output = |named: bool| {
             (0..outputs.len()).find(|&k| {
                 let name = outputs[k].name.to_lowercase();
                 (!named || ["pha", "alpha", "mask", "depth"].iter().any(|part| name.contains(part)))
-                    && channels_at(&outputs[k], &[1, 2]).is_some()
+                    && channel_axis(&outputs[k], &[1, 2]).is_some()
             })
         };
-        let answer = answers(true).or_else(|| answers(false)).or((outputs.len() == 1).then_some(0));
-        let answer = answer.ok_or("none of its outputs is a picture with one or two channels")?;
+        let output = find_output(true).or_else(|| find_output(false)).or((outputs.len() == 1).then_some(0));
+        let output = output.ok_or("none of its outputs is a picture with one or two channels")?;
         // Other inputs are recurrent states, in the order of the outputs (as in Robust Video Matting), or a ratio.
         let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
         let states =
             (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
-        let memory: Vec<(usize, usize)> = others.clone().zip(states).collect();
-        if memory.len() != others.count() || memory.iter().any(|&(_, output)| output == answer) {
+        let recurrent_states: Vec<(usize, usize)> = others.clone().zip(states).collect();
+        if recurrent_states.len() != others.count() || recurrent_states.iter().any(|&(_, state)| state == output) {
             return Err("it has inputs other than a picture and its own earlier output".to_owned());
         }
         let inputs = (0..inputs.len()).map(|k| match k {
-            _ if k == picture => Tensor::zeros(&if planes { [1, 3, height, width] } else { [1, height, width, 3] }),
+            _ if k == picture => Tensor::zeros(&if is_planar { [1, 3, height, width] } else { [1, height, width, 3] }),
             _ if is_ratio(&inputs[k]) => Tensor { shape: vec![1], values: vec![1.0] },
             // Variable sizes of states are 1 at first: one number is broadcast.
             _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
@@ -120,23 +120,23 @@ impl Feed {
         Ok(Self {
             network,
             size: (width, height),
-            planes,
+            is_planar,
             scaling,
             bgr,
             picture,
-            answer,
-            memory,
+            output,
+            recurrent_states,
             inputs,
             outputs: Vec::new(),
             scale: Scale::default(),
             row: Vec::new(),
-            small: Vec::new(),
+            scaled: Vec::new(),
         })
     }
 
     /// Resets the recurrent states, for a new scene.
-    pub fn forget(&mut self) {
-        for &(input, _) in &self.memory {
+    pub fn reset(&mut self) {
+        for &(input, _) in &self.recurrent_states {
             self.inputs[input].values.fill(0.0);
         }
     }
@@ -144,42 +144,42 @@ impl Feed {
     /// Runs the network on a picture.
     ///
     /// # Errors
-    /// See [`Self::answer`].
-    pub fn infer(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
+    /// See [`Self::run`].
+    pub fn infer(&mut self, color: &ColorImage) -> Result<NetworkOutput<'_>, String> {
         self.set_picture(color);
-        self.answer()
+        self.run()
     }
 
     /// Runs the network on the picture set by [`Self::set_picture`].
     ///
     /// # Errors
     /// The runtime fails, or the output is no picture of finite numbers.
-    pub fn answer(&mut self) -> Result<Answer<'_>, String> {
+    pub fn run(&mut self) -> Result<NetworkOutput<'_>, String> {
         self.network.run(&self.inputs, &mut self.outputs)?;
-        for &(input, output) in &self.memory {
+        for &(input, output) in &self.recurrent_states {
             std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
         }
-        let answer = self.outputs.get(self.answer).ok_or("it gives no output")?;
-        let answer = picture_of(answer).ok_or_else(|| format!("its output is not a picture: {:?}", answer.shape))?;
-        match answer.values.iter().all(|value| value.is_finite()) {
-            true => Ok(answer),
+        let output = self.outputs.get(self.output).ok_or("it gives no output")?;
+        let output = parse_output(output).ok_or_else(|| format!("its output is not a picture: {:?}", output.shape))?;
+        match output.values.iter().all(|value| value.is_finite()) {
+            true => Ok(output),
             false => Err("its output has a value that is not a number".to_owned()),
         }
     }
 
-    /// Sets the input picture for [`Self::answer`].
+    /// Sets the input picture for [`Self::run`].
     pub fn set_picture(&mut self, color: &ColorImage) {
         let (width, height) = self.size;
         self.scale.adapt((color.width as usize, color.height as usize), self.size);
-        self.small.resize(3 * width, 0);
+        self.scaled.resize(3 * width, 0);
         let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
         let factor = self.scaling.divisor.map(f32::recip);
         let values = &mut self.inputs[self.picture].values;
         for y in 0..height {
-            self.scale.row(&color.rgb, y, 0..width, &mut self.row, &mut self.small);
-            for (x, pixel) in self.small.as_chunks::<3>().0.iter().enumerate() {
+            self.scale.row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
+            for (x, pixel) in self.scaled.as_chunks::<3>().0.iter().enumerate() {
                 for c in 0..3 {
-                    let at = if self.planes { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
+                    let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
                     values[at] = (f32::from(pixel[order[c]]) - self.scaling.mean[c]) * factor[c];
                 }
             }
@@ -188,12 +188,12 @@ impl Feed {
 }
 
 /// Returns the channel axis of a picture port with one of these channel counts, 1 or 3; `None` if it is not a picture.
-fn channels_at(port: &Port, channels: &[usize]) -> Option<usize> {
-    let &[batch, planes, _, last] = port.shape.as_slice() else { return None };
+fn channel_axis(port: &Port, channels: &[usize]) -> Option<usize> {
+    let &[batch, is_planar, _, last] = port.shape.as_slice() else { return None };
     let has = |side: Option<usize>| side.is_some_and(|side| channels.contains(&side));
     match () {
         () if batch.is_some_and(|batch| batch != 1) => None,
-        () if has(planes) => Some(1),
+        () if has(is_planar) => Some(1),
         () if has(last) => Some(3),
         () => None,
     }
@@ -205,14 +205,14 @@ fn is_ratio(port: &Port) -> bool {
 }
 
 /// Interprets a tensor as a picture of one or two channels, by its shape.
-fn picture_of(tensor: &Tensor) -> Option<Answer<'_>> {
+fn parse_output(tensor: &Tensor) -> Option<NetworkOutput<'_>> {
     let values = tensor.values.as_slice();
-    let (planes, channels, height, width) = match *tensor.shape.as_slice() {
+    let (is_planar, channels, height, width) = match *tensor.shape.as_slice() {
         [1, channels @ 1..=2, height, width] => (true, channels, height, width),
         [1, height, width, channels @ 1..=2] => (false, channels, height, width),
         [1, height, width] | [height, width] => (true, 1, height, width),
         _ => return None,
     };
     let is_valid = width > 1 && height > 1 && width * height * channels == values.len();
-    is_valid.then_some(Answer { size: (width, height), channels, values, planes })
+    is_valid.then_some(NetworkOutput { size: (width, height), channels, values, is_planar })
 }

@@ -1,107 +1,107 @@
 //! Completes masks: adds what a subject holds, such as a mug, and removes persons further away.
 
-use super::belongings::Belongings;
-use super::relief::Relief;
-use crate::depth::tap::nearest;
+use super::held_objects::HeldObjects;
+use super::relative_depth::RelativeDepth;
+use crate::depth::tap::nearest_index;
 use crate::frame::Mask;
 
 /// Minimum mean nearness of a subject; persons further away are others.
-const OTHERS: f32 = 0.55;
+const MIN_SUBJECT_NEARNESS: f32 = 0.55;
 /// Hysteresis of that threshold.
 const HYSTERESIS: f32 = 0.07;
 /// Minimum mask value of a region.
-const THRESHOLD: f32 = 0.5;
+const PERSON_ALPHA: f32 = 0.5;
 
 /// Completes masks by nearness; owns the memory for it.
 #[derive(Default)]
-pub struct Held {
+pub struct SubjectMask {
     mask: Mask,
     /// Nearness of each mask pixel.
     nearness: Vec<f32>,
     /// Whether a pixel was another person's in the previous frame.
     others: Vec<bool>,
     /// Visited pixels, and the queue of the flood fill.
-    seen: Vec<bool>,
-    front: Vec<u32>,
-    belongings: Belongings,
+    visited: Vec<bool>,
+    queue: Vec<u32>,
+    held_objects: HeldObjects,
 }
 
-impl Held {
+impl SubjectMask {
     /// Returns the mask of the subject with held objects.
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
     /// Resets the state, for a new scene.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.others.clear();
-        self.belongings.forget();
+        self.held_objects.reset();
     }
 
     /// Adds held objects to a mask, and removes other persons.
-    pub fn complete(&mut self, mask: &Mask, relief: &Relief) {
+    pub fn complete_mask(&mut self, mask: &Mask, relative_depth: &RelativeDepth) {
         let (width, height) = (mask.width as usize, mask.height as usize);
         self.mask.clone_from(mask);
-        let near = |at: usize| relief.nearness()[nearest(at, (width, height), relief.size())];
+        let near = |at: usize| relative_depth.nearness()[nearest_index(at, (width, height), relative_depth.size())];
         self.nearness.clear();
         self.nearness.extend((0..width * height).map(near));
         self.remove_others();
-        self.belongings.add(&mut self.mask.alpha, &self.nearness, width, THRESHOLD);
+        self.held_objects.add_to_mask(&mut self.mask.alpha, &self.nearness, width, PERSON_ALPHA);
     }
 
     /// Removes regions of the mask whose mean nearness is low: other persons.
     fn remove_others(&mut self) {
         let count = self.mask.alpha.len();
-        self.seen.clear();
-        self.seen.resize(count, false);
+        self.visited.clear();
+        self.visited.resize(count, false);
         let is_first = self.others.len() != count;
         self.others.resize(count, false);
         for start in 0..self.mask.alpha.len() {
-            if self.seen[start] || self.mask.alpha[start] < THRESHOLD {
+            if self.visited[start] || self.mask.alpha[start] < PERSON_ALPHA {
                 continue;
             }
-            self.front.clear();
-            self.flood(start, |held, at| held.mask.alpha[at] >= THRESHOLD);
-            let near: f32 = self.front.iter().map(|&at| self.nearness[at as usize]).sum();
-            let were_others = self.front.iter().filter(|&&at| self.others[at as usize]).count();
+            self.queue.clear();
+            self.flood_fill(start, |this, at| this.mask.alpha[at] >= PERSON_ALPHA);
+            let near: f32 = self.queue.iter().map(|&at| self.nearness[at as usize]).sum();
+            let were_others = self.queue.iter().filter(|&&at| self.others[at as usize]).count();
             let least = match () {
-                () if is_first => OTHERS,
-                () if 2 * were_others > self.front.len() => OTHERS + HYSTERESIS,
-                () => OTHERS - HYSTERESIS,
+                () if is_first => MIN_SUBJECT_NEARNESS,
+                () if 2 * were_others > self.queue.len() => MIN_SUBJECT_NEARNESS + HYSTERESIS,
+                () => MIN_SUBJECT_NEARNESS - HYSTERESIS,
             };
-            let are_others = near < least * self.front.len() as f32;
-            self.front.iter().for_each(|&at| self.others[at as usize] = are_others);
+            let are_others = near < least * self.queue.len() as f32;
+            self.queue.iter().for_each(|&at| self.others[at as usize] = are_others);
             if are_others {
                 // Including their soft outlines.
-                let component = std::mem::take(&mut self.front);
+                let component = std::mem::take(&mut self.queue);
                 for &at in &component {
                     self.clear_around(at as usize);
                 }
-                self.front = component;
+                self.queue = component;
             }
         }
-        self.others.iter_mut().zip(&self.seen).for_each(|(is_other, seen)| *is_other &= seen);
+        self.others.iter_mut().zip(&self.visited).for_each(|(is_other, visited)| *is_other &= visited);
     }
 
-    /// Appends to `front` the pixels connected to `start` that belong to it (4-connected).
-    fn flood(&mut self, start: usize, belongs: impl Fn(&Self, usize) -> bool) {
+    /// Appends to `queue` the pixels connected to `start` that belong to it (4-connected).
+    fn flood_fill(&mut self, start: usize, is_member: impl Fn(&Self, usize) -> bool) {
         let (width, height) = (self.mask.width as usize, self.mask.height as usize);
-        let mut next = self.front.len();
-        self.seen[start] = true;
-        self.front.push(start as u32);
-        while let Some(&at) = self.front.get(next) {
+        let mut next = self.queue.len();
+        self.visited[start] = true;
+        self.queue.push(start as u32);
+        while let Some(&at) = self.queue.get(next) {
             next += 1;
             let (x, y) = (at as usize % width, at as usize / width);
-            let beside = [
+            let neighbours = [
                 (x > 0, (at as usize).wrapping_sub(1)),
                 (x + 1 < width, at as usize + 1),
                 (y > 0, (at as usize).wrapping_sub(width)),
                 (y + 1 < height, at as usize + width),
             ];
-            for (_, at) in beside.into_iter().filter(|(inside, _)| *inside) {
-                if !self.seen[at] && belongs(self, at) {
-                    self.seen[at] = true;
-                    self.front.push(at as u32);
+            for (_, at) in neighbours.into_iter().filter(|(inside, _)| *inside) {
+                if !self.visited[at] && is_member(self, at) {
+                    self.visited[at] = true;
+                    self.queue.push(at as u32);
                 }
             }
         }
@@ -115,7 +115,7 @@ impl Held {
             for x in x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width) {
                 // Keeps the pixels of a subject beside them.
                 let at = y * width + x;
-                if self.others[at] || self.nearness[at] < OTHERS {
+                if self.others[at] || self.nearness[at] < MIN_SUBJECT_NEARNESS {
                     self.mask.alpha[at] = 0.0;
                 }
             }
@@ -137,18 +137,18 @@ mod tests {
     fn joined(persons: &[Columns], near: &[(Columns, f32)]) -> Vec<bool> {
         let inside = |at: usize| near.iter().find(|((from, to), _)| (*from..*to).contains(&(at % SIZE.0)));
         let persons = columns(persons);
-        let mut held = Held {
+        let mut held = SubjectMask {
             mask: Mask {
                 width: SIZE.0 as u32,
                 height: SIZE.1 as u32,
                 alpha: (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons[at % SIZE.0]))).collect(),
             },
             nearness: (0..SIZE.0 * SIZE.1).map(|at| inside(at).map_or(0.1, |(_, nearness)| *nearness)).collect(),
-            ..Held::default()
+            ..SubjectMask::default()
         };
         held.remove_others();
-        held.belongings.add(&mut held.mask.alpha, &held.nearness, SIZE.0, THRESHOLD);
-        held.mask.alpha[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
+        held.held_objects.add_to_mask(&mut held.mask.alpha, &held.nearness, SIZE.0, PERSON_ALPHA);
+        held.mask.alpha[8 * SIZE.0..][..SIZE.0].iter().map(|alpha| *alpha > 0.5).collect()
     }
 
     fn columns(ranges: &[Columns]) -> Vec<bool> {
@@ -164,18 +164,18 @@ mod tests {
     #[test]
     fn who_is_about_as_far_as_others_are_does_not_come_and_go() {
         let persons = |at: usize| (4..10).contains(&(at % SIZE.0)) || (20..26).contains(&(at % SIZE.0));
-        let is_there = |held: &mut Held, nearness: f32| {
-            let share = (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons(at)))).collect();
-            held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha: share };
+        let is_there = |held: &mut SubjectMask, nearness: f32| {
+            let alpha = (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons(at)))).collect();
+            held.mask = Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, alpha };
             held.nearness = (0..SIZE.0 * SIZE.1).map(|at| if at % SIZE.0 < 16 { 1.0 } else { nearness }).collect();
             held.remove_others();
             held.mask.alpha[8 * SIZE.0 + 23] > 0.5
         };
-        for first in [OTHERS - 0.02, OTHERS + 0.02] {
-            let mut held = Held::default();
+        for first in [MIN_SUBJECT_NEARNESS - 0.02, MIN_SUBJECT_NEARNESS + 0.02] {
+            let mut held = SubjectMask::default();
             let was = is_there(&mut held, first);
             for trembling in [0.01, -0.01, 0.05, -0.05] {
-                assert_eq!(is_there(&mut held, OTHERS + trembling), was, "{first} {trembling}");
+                assert_eq!(is_there(&mut held, MIN_SUBJECT_NEARNESS + trembling), was, "{first} {trembling}");
             }
             assert!(is_there(&mut held, 0.9) && !is_there(&mut held, 0.3));
         }

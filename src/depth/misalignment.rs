@@ -24,14 +24,14 @@ impl Misalignment {
     /// Like [`Misalignment::measure`] with a known alignment of the outlines.
     pub fn from_alignment(outlines: EdgeAlignment, map: &DepthMap, color: &ColorImage) -> Option<Self> {
         let smaller = (map.width < color.width).then(|| map.size());
-        let fits = smaller.is_none() && matches!(outlines, EdgeAlignment::Meets | EdgeAlignment::Unknown);
+        let fits = smaller.is_none() && matches!(outlines, EdgeAlignment::Aligned | EdgeAlignment::Unknown);
         (!fits).then_some(Self { smaller, outlines })
     }
 
     /// Returns the required correction; `None` if the picture has no edges near the depth edges.
     pub fn correction(self, map: &DepthMap, color: &ColorImage) -> Option<MapCorrection> {
         let (mut outlines, mut distance_px) = (self.outlines, 0);
-        if let EdgeAlignment::Beside { distance_px: picture_px } = outlines {
+        if let EdgeAlignment::Shifted { distance_px: picture_px } = outlines {
             // The last pixel is left to the colours, so that thin structures are not lost.
             distance_px = picture_px - picture_px.signum();
             let mut moved = map.clone();
@@ -48,8 +48,10 @@ impl Misalignment {
         let coarsest = match outlines {
             EdgeAlignment::Unrelated => return None,
             EdgeAlignment::Soft { width_px } => width_px.div_ceil(3).max(of_size),
-            EdgeAlignment::Meets | EdgeAlignment::Unknown | EdgeAlignment::Beside { .. } if distance_px == 0 => of_size,
-            EdgeAlignment::Meets | EdgeAlignment::Unknown | EdgeAlignment::Beside { .. } => of_size.max(2),
+            EdgeAlignment::Aligned | EdgeAlignment::Unknown | EdgeAlignment::Shifted { .. } if distance_px == 0 => {
+                of_size
+            }
+            EdgeAlignment::Aligned | EdgeAlignment::Unknown | EdgeAlignment::Shifted { .. } => of_size.max(2),
         };
         Some(MapCorrection { distance_px, coarsest })
     }
@@ -62,13 +64,13 @@ impl fmt::Display for Misalignment {
         }
         let and = if self.smaller.is_some() { " and " } else { "" };
         match self.outlines {
-            EdgeAlignment::Beside { distance_px } => {
+            EdgeAlignment::Shifted { distance_px } => {
                 let side = if distance_px < 0 { "outside" } else { "inside" };
                 write!(f, "{and}its outlines lie about {} px {side} those of the picture", distance_px.abs())
             }
             EdgeAlignment::Soft { width_px } => write!(f, "{and}its outlines are about {width_px} px wide"),
             EdgeAlignment::Unrelated => write!(f, "{and}none of its outlines match those of the picture"),
-            EdgeAlignment::Meets | EdgeAlignment::Unknown => Ok(()),
+            EdgeAlignment::Aligned | EdgeAlignment::Unknown => Ok(()),
         }
     }
 }
