@@ -1,6 +1,6 @@
 //! The demonstration: a short, built-in loop of the project's own scene with its depth.
 //!
-//! `recordings/make.rs` renders it, anti-aliased. `color.mjpeg` and `depth.mpng` are concatenated JPEGs and PNGs: first
+//! `crates/lab/examples/make_recordings` renders it, anti-aliased. `color.mjpeg` and `depth.mpng` are concatenated JPEGs and PNGs: first
 //! a full picture, then for each frame the tiles that ever change, packed side by side; `moving.png` marks these tiles.
 //! Each picture is decoded when it is first shown, and cached: from the second round on, playing only copies.
 

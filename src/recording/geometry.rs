@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(half.rig.depth_m(20.0), full.rig.depth_m(40.0));
         assert_eq!(fitted(full, (2000, 1001)).unwrap(), full);
         let refused = fitted(full, (1000, 700)).unwrap_err().to_string();
-        assert!(refused.starts_with("calib.txt: made for pictures of 2000x1001, and these are 1000x700"), "{refused}");
+        assert!(refused.starts_with("calib.txt: made for pictures of 2000x1001, but these are 1000x700"), "{refused}");
         let for_any = Geometry { size: None, ..full };
         assert_eq!(fitted(for_any, (7, 9)).unwrap(), for_any);
     }

@@ -83,7 +83,7 @@ fn exchanged_eyes_are_seen() {
     let [left, right] = pair(20.0, 0.0);
     let found = checked(&[right, left]);
     assert_eq!((found.negative_fraction, found.verdict()), (1.0, Verdict::Swapped), "{found:?}");
-    assert!(found.verdict().to_string().contains("exchange"));
+    assert!(found.verdict().to_string().contains("swapped"));
 }
 
 #[test]

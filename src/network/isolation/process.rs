@@ -199,7 +199,7 @@ mod tests {
         let shell = |script: &str| asked(Command::new("sh").args(["-c", script]), LOAD_TIMEOUT).1;
         assert_eq!(shell("exit 3"), "its process ended");
         assert!(shell("kill -ABRT $$").contains("more than 4 GiB of memory"));
-        assert!(shell("printf '\\377\\377\\377\\377x' >&0; sleep 1000").contains("too much"));
+        assert!(shell("printf '\\377\\377\\377\\377x' >&0; sleep 1000").contains("too long"));
         assert!(shell("printf '\\2\\0\\0\\0{}' >&0; sleep 1000").contains("expected"));
     }
 

@@ -264,7 +264,7 @@ mod tests {
             ("[presets.mine]\nmirror = true\n", 2, "does not belong to the look"),
             ("[presets.mine]\npreset = 'portrait'\n", 2, "does not belong to the look"),
             ("[presets.mine]\nf-number = 2\ncoc-at-infinity = 3\n", 3, "cannot be used with"),
-            ("blur = 3\ncoc-at-infinity = 3\n", 2, "is there already"),
+            ("blur = 3\ncoc-at-infinity = 3\n", 2, "is given twice"),
             ("[presets.mine.rim]\nx = 1\n", 1, "must be a text, a number"),
             ("rim = 0.1\n[presets.portrait]\nrim = 0.2\n", 2, "is built in"),
             ("[presets.\" \"]\n", 1, "needs a name"),

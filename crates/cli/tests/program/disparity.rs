@@ -218,7 +218,7 @@ fn what_does_not_fit_is_refused_in_one_line() {
         ("hello\n", "c.txt: neither a Middlebury calibration"),
         (
             "cam0=[100 0 80; 0 100 32; 0 0 1]\ndoffs=0\nbaseline=9\nwidth=160\nheight=80\n",
-            "c.txt: made for pictures of 160x80, and these are 160x64",
+            "c.txt: made for pictures of 160x80, but these are 160x64",
         ),
     ] {
         fs::write(desk.path("c.txt"), calib).unwrap();
