@@ -7,7 +7,7 @@ use crate::program::{Home, PORTRAIT, Ran, json};
 /// Streams the recording to `null` with these arguments; returns stderr and the report.
 fn streamed(arguments: &[&str]) -> (String, Value) {
     let home = Home::new();
-    let stream = ["stream", PORTRAIT, "--pace", "asap", "--to", "null", "--report", "report.json"];
+    let stream = ["stream", PORTRAIT, "--frames", "6", "--pace", "asap", "--to", "null", "--report", "report.json"];
     let ran = Ran::of(&mut home.with_drivers(&[&stream, arguments].concat()));
     (ran.done().to_owned(), json(home.path("report.json")))
 }

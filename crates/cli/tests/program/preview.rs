@@ -16,8 +16,8 @@ fn what_does_not_fit_a_window_costs_one_line_and_exit_code_2() {
     refused(&["preview", "no/such/place"], 1, "no/such/place");
     refused(&["preview", PORTRAIT, "--pace", "asap"], 2, "--pace asap");
     refused(&["preview", PORTRAIT, "--on-demand"], 2, "--on-demand");
-    refused(&["preview", PORTRAIT, "--to", "null"], 2, "combined with a window");
-    refused(&["preview", PORTRAIT, "--to", "window"], 2, "combined with a window");
+    refused(&["preview", PORTRAIT, "--to", "null"], 2, "beside a window");
+    refused(&["preview", PORTRAIT, "--to", "window"], 2, "beside a window");
     refused(&["preview", PORTRAIT, "--split", "1.5"], 2, "from 0 to 1");
     refused(&["preview", PORTRAIT, "--preset", "nobody"], 2, "nobody");
     refused(&["stream", PORTRAIT, "--to", "window", "--to", "window"], 2, "given twice");

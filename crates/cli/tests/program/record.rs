@@ -95,7 +95,7 @@ fn a_source_that_fails_leaves_the_old_recording() {
     fs::write(at("source/rgb/000000.png"), first).unwrap();
     fs::write(at("source/rgb/000003.png"), "").unwrap();
     let ran = home.run(&["record", "source", "--to", "old", "--force"]);
-    ran.failed(1, &["old: as it was", "3 frames are in old.incomplete"]);
+    ran.failed(1, &["old: unchanged", "3 frames are in old.incomplete"]);
     assert_eq!((all(&at("old")), read(&at("old.incomplete"))), (before, (3, 50)));
 
     // Without an old recording, they keep the requested name.
@@ -169,7 +169,7 @@ fn a_recording_that_is_cut_short_is_readable() {
 
     let ran = begun(&home, &long, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
     ran.done();
-    assert!(ran.stderr.contains("old: as it was") && ran.stderr.contains("are in old.incomplete"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("old: unchanged") && ran.stderr.contains("are in old.incomplete"), "{}", ran.stderr);
     assert_eq!(all(&at("old")), before);
     assert!(read(&at("old.incomplete")).0 >= 3);
 

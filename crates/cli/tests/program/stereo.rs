@@ -122,7 +122,7 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
         right.set_luma_from(&was_left);
         left.rgb = was_right.luma.iter().flat_map(|&luma| [luma; 3]).collect();
     });
-    assert!(exchanged.len() == 1 && exchanged[0].contains("exchanged"), "{exchanged:?}");
+    assert!(exchanged.len() == 1 && exchanged[0].contains("swapped"), "{exchanged:?}");
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn what_would_run_for_ever_or_take_all_memory_is_refused_in_one_line() {
     let named = node("Gather", &["in", "\u{1b}]0;title\u{7}\u{1b}[31m\nred"], "out", &[]);
     let escapes = network(&[integers("\u{1b}]0;title\u{7}\u{1b}[31m\nred", &[1_000_000_000])], &[named]);
     for (name, bytes, expected) in [
-        ("forever", forever, "the operator Loop, which may run for ever"),
+        ("forever", forever, "the operator Loop, which may run forever"),
         ("much", shape(&[1, 1, 100_000, 100_000]), "more than 4 GiB of memory"),
         ("all", shape(&[1, 1 << 40, 1 << 40, 1 << 40]), "all.onnx"),
         ("pads", padded, "pads.onnx"),
