@@ -10,7 +10,7 @@
 
 pub mod dialog;
 pub mod keys;
-pub mod lent;
+pub mod remote_changes;
 pub mod meters;
 pub mod panel;
 pub mod present;

@@ -10,7 +10,7 @@ fn press(key: Key, modifiers: Modifiers) -> Event {
 }
 
 fn does(state: &State, key: Key, modifiers: Modifiers) -> Option<Action> {
-    action(&press(key, modifiers), state, CONTEXT, false)
+    action_for_event(&press(key, modifiers), state, CONTEXT, false)
 }
 
 #[test]
@@ -146,16 +146,16 @@ fn only_some_keys_repeat_and_some_belong_to_a_control_in_focus() {
     let state = state();
     let repeated = |key: Key| {
         let event = Event::Key { key, physical_key: None, pressed: true, repeat: true, modifiers: Modifiers::NONE };
-        action(&event, &state, CONTEXT, false)
+        action_for_event(&event, &state, CONTEXT, false)
     };
     assert!(repeated(Key::CloseBracket).is_some() && repeated(Key::ArrowUp).is_some());
     assert!(repeated(Key::M).is_none() && repeated(Key::V).is_none());
-    let focused = |key: Key| action(&press(key, Modifiers::NONE), &state, CONTEXT, true);
+    let focused = |key: Key| action_for_event(&press(key, Modifiers::NONE), &state, CONTEXT, true);
     assert!(focused(Key::ArrowUp).is_none() && focused(Key::Space).is_none() && focused(Key::Escape).is_none());
     assert!(focused(Key::M).is_some());
     let released =
         Event::Key { key: Key::M, physical_key: None, pressed: false, repeat: false, modifiers: Modifiers::NONE };
-    assert_eq!(action(&released, &state, CONTEXT, false), None);
+    assert_eq!(action_for_event(&released, &state, CONTEXT, false), None);
 }
 
 #[test]

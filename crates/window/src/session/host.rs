@@ -9,7 +9,7 @@ use std::sync::mpsc;
 
 use super::live::Live;
 use super::{Closed, Command, EventSender, SessionEvent, Start, held};
-use crate::services::Switch;
+use crate::services::CliOption;
 use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::files::user_folders as folders;
 use bokehcam::link::demand::Watch;
@@ -24,7 +24,7 @@ pub(super) struct Host {
     /// Configuration; look, source and outputs are kept current.
     start: Start,
     /// Depth method that the user requested; `None` for the default.
-    way: Option<DepthMethod>,
+    depth_method: Option<DepthMethod>,
     /// Held while an output is active, to keep the source from pausing.
     watch: Option<Watch>,
     events: EventSender,
@@ -48,7 +48,7 @@ impl Host {
     pub fn new(start: Start, events: EventSender, commands: mpsc::Sender<Command>) -> Self {
         Self {
             start,
-            way: None,
+            depth_method: None,
             watch: None,
             events,
             commands,
@@ -121,7 +121,7 @@ impl Host {
         match request {
             Request::Open(name) => {
                 // The depth method is specific to a source.
-                self.way = self.way.filter(|_| self.start.source == name);
+                self.depth_method = self.depth_method.filter(|_| self.start.source == name);
                 self.start.source = name;
                 self.stop();
                 self.open();
@@ -130,7 +130,7 @@ impl Host {
                 Some(guide) => guide.request_capture(),
                 None => self.set_depth_method(DepthMethod::Plate),
             },
-            Request::DepthBy(way) => self.set_depth_method(way),
+            Request::DepthBy(depth_method) => self.set_depth_method(depth_method),
             Request::Begin(output) => {
                 self.write_to(output);
                 self.report_outputs();
@@ -169,11 +169,11 @@ impl Host {
     }
 
     /// Reopens the source with another depth method, if it supports that.
-    fn set_depth_method(&mut self, way: DepthMethod) {
-        if let Err(line) = self.start.services.check_depth_method(&self.start.source, way) {
+    fn set_depth_method(&mut self, depth_method: DepthMethod) {
+        if let Err(line) = self.start.services.check_depth_method(&self.start.source, depth_method) {
             return self.events.note(line);
         }
-        self.way = Some(way);
+        self.depth_method = Some(depth_method);
         self.stop();
         self.open();
     }
@@ -204,7 +204,7 @@ impl Host {
     /// Opens the source and starts its run.
     fn open(&mut self) {
         self.events.send_update(Update::Source(Source::Opening));
-        let opened = match self.start.services.open(&self.start.source, self.way) {
+        let opened = match self.start.services.open(&self.start.source, self.depth_method) {
             Ok(opened) => opened,
             Err(line) => return self.report_no_source(Source::Lost(line)),
         };
@@ -244,7 +244,7 @@ impl Host {
         if output.name.is_empty() {
             output.name = self.unused_video_path().display().to_string();
         }
-        match self.start.services.output(&output.name, live.size, live.period_ns, &live.stop) {
+        match self.start.services.open_output(&output.name, live.size, live.period_ns, &live.stop) {
             Ok(sink) => {
                 self.start.output_request.set_needed_in_memory(true);
                 live.add_output(&output, sink);
@@ -263,7 +263,7 @@ impl Host {
     }
 
     /// Copies the equivalent command to the clipboard.
-    fn copy(&self, switches: &[Switch]) {
+    fn copy(&self, switches: &[CliOption]) {
         // The current recording's file already exists: the command gets a new name.
         let again = |output: &Output| match output.is_camera {
             true => output.name.clone(),
@@ -271,7 +271,7 @@ impl Host {
         };
         let outputs: Vec<String> = self.start.outputs.iter().map(again).collect();
         let look = self.effective_look();
-        let command = self.start.services.command(&look, &self.start.source, &outputs, switches);
+        let command = self.start.services.format_command(&look, &self.start.source, &outputs, switches);
         self.events.note(format!("Copied: {command}"));
         self.events.send(SessionEvent::Copy(command));
     }

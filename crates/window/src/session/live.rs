@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::super::services::{Opened, Services};
+use super::super::services::{OpenedSource, Services};
 use super::super::state::{Output, Running, Source};
 use super::{EventSender, SessionEvent, Start};
 use bokehcam::clock::Clock;
@@ -42,20 +42,20 @@ impl Live {
     /// # Errors
     /// Returns a one-line message if the executor or the thread cannot be created.
     pub(super) fn begin(
-        opened: Opened,
+        opened: OpenedSource,
         start: &mut Start,
         events: &EventSender,
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
+        let OpenedSource { name, source, has_depth, depth_methods, depth_method, camera: facts, .. } = opened;
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
         let known = SourceDepth { has_depth, is_relative: facts.is_relative, size: info.size };
         let look = start.look.for_source(known);
         let (blurring, changes) =
-            BlurSetup::create(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
+            BlurSetup::create(look, (info.size, ADAPTIVE), |settings| start.services.create_executor(settings, info.size))?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
         // Outputs can be added and removed during the run; the shutter withholds pictures from all of them.
@@ -102,8 +102,8 @@ impl Live {
             is_live: info.live,
             kind,
             depth_from,
-            ways,
-            way,
+            depth_methods,
+            depth_method,
             executor,
             budget_ns,
         });
@@ -124,7 +124,7 @@ impl Live {
         let size = self.size;
         self.changes.switch_look(look, number, |settings| {
             let began = Instant::now();
-            let bokeh = services.executor(settings, size)?;
+            let bokeh = services.create_executor(settings, size)?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());
             Ok(bokeh)
         })

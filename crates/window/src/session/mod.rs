@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 pub use held::Still;
 use host::Host;
 
-use super::services::{Services, Switch};
+use super::services::{Services, CliOption};
 use super::state::{Output, Request, Update};
 use bokehcam::capture::Seeker;
 use bokehcam::control::Answer;
@@ -107,7 +107,7 @@ enum Command {
     Save(Box<Still>, SaveOptions),
     Hold(Box<Still>, bool),
     ShutterControl,
-    Copy(Vec<Switch>),
+    Copy(Vec<CliOption>),
     /// An event of an output of the run with this number.
     OutputEvent(u64, Notice),
     /// The run with this number ended.
@@ -159,7 +159,7 @@ impl Session {
     }
 
     /// Requests the equivalent command for the clipboard; `switches` are the window's options.
-    pub fn copy(&self, switches: Vec<Switch>) {
+    pub fn copy(&self, switches: Vec<CliOption>) {
         let _ = self.commands.send(Command::Copy(switches));
     }
 

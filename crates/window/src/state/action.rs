@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Camera, DepthMethod, Output, Shown, Source};
-use crate::services::Browse;
+use crate::services::PathKind;
 use bokehcam::camera_control::CameraControl;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
@@ -84,7 +84,7 @@ pub enum Action {
     VirtualCamera(Option<String>),
     Open(String),
     /// Opens a file chooser for a source or a background picture.
-    Browse(Browse),
+    Browse(PathKind),
     /// Switches the camera's frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     /// Reopens the source.
@@ -135,7 +135,7 @@ pub enum Request {
     Open(String),
     /// Opens this source if it is valid.
     Offer(String),
-    Browse(Browse),
+    Browse(PathKind),
     /// Reopens the camera with this frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     Control(String, i64),

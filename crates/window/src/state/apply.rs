@@ -97,7 +97,7 @@ impl State {
             Action::TakePlate => self.note(NO_PLATE),
             Action::DeclinePlate => self.declined_plate = true,
             Action::FindMe => return vec![Request::DepthBy(DepthMethod::Person)],
-            Action::DepthBy(way) => return vec![Request::DepthBy(way)],
+            Action::DepthBy(depth_method) => return vec![Request::DepthBy(depth_method)],
             Action::Portrait(on) => return self.set_portrait(on),
             Action::Refresh => return vec![Request::Refresh],
             Action::CopyCommand => return vec![Request::CopyCommand],

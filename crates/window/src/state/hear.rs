@@ -36,7 +36,7 @@ impl State {
     /// Sets the source, and adapts the view and the look to it.
     fn set_source(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
-            self.meters.restart();
+            self.meters.clear_recent();
             self.source_name.clone_from(&running.name);
         }
         self.source = source;

@@ -17,7 +17,7 @@ mod switches;
 mod tests;
 mod transport;
 pub mod tweak;
-mod way;
+mod depth_method;
 mod zoom;
 
 use std::path::PathBuf;
@@ -28,11 +28,11 @@ pub use camera::Camera;
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 pub use transport::Transport;
-pub use way::DepthMethod;
+pub use depth_method::DepthMethod;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
-use super::texts::translated;
+use super::texts::translate_sentence;
 pub use super::views::Shown;
 use super::views::{Legend, Probe};
 use bokehcam::camera_control::CameraControl;
@@ -77,8 +77,8 @@ pub struct Running {
     /// Origin of its depth.
     pub depth_from: DepthOrigin,
     /// Depth methods the source supports, and the active one.
-    pub ways: Vec<DepthMethod>,
-    pub way: Option<DepthMethod>,
+    pub depth_methods: Vec<DepthMethod>,
+    pub depth_method: Option<DepthMethod>,
     pub executor: String,
     /// Time budget for the blur of a frame.
     pub budget_ns: u64,
@@ -204,7 +204,7 @@ impl State {
 
     /// Adds a message, translated into the display language.
     pub fn note(&mut self, text: impl Into<String>) {
-        let text = translated(&text.into());
+        let text = translate_sentence(&text.into());
         // A repeated message replaces the earlier one and is shown anew.
         self.notes.retain(|note| note.text != text);
         self.noted += 1;
@@ -229,27 +229,27 @@ impl State {
     }
 
     /// Returns the depth methods that the source supports.
-    pub fn ways(&self) -> &[DepthMethod] {
+    pub fn depth_methods(&self) -> &[DepthMethod] {
         match &self.source {
-            Source::Running(running) => &running.ways,
+            Source::Running(running) => &running.depth_methods,
             Source::Opening | Source::Lost(_) | Source::Ended => &[],
         }
     }
 
     /// Returns the active depth method.
-    pub fn way(&self) -> Option<DepthMethod> {
-        if let Source::Running(running) = &self.source { running.way } else { None }
+    pub fn depth_method(&self) -> Option<DepthMethod> {
+        if let Source::Running(running) = &self.source { running.depth_method } else { None }
     }
 
     /// Whether a background plate can be captured.
     pub fn can_capture_plate(&self) -> bool {
-        self.ways().contains(&DepthMethod::Plate)
+        self.depth_methods().contains(&DepthMethod::Plate)
     }
 
     /// Returns person segmentation as a fallback while the plate is missing or does not match the picture.
-    pub fn way_without_plate(&self) -> Option<DepthMethod> {
+    pub fn method_without_plate(&self) -> Option<DepthMethod> {
         let lacks_plate = self.plate.is_some_and(|step| step != Step::Ready);
-        Some(DepthMethod::Person).filter(|way| lacks_plate && self.ways().contains(way))
+        Some(DepthMethod::Person).filter(|depth_method| lacks_plate && self.depth_methods().contains(depth_method))
     }
 
     /// Whether the source has no depth and the user is offered methods to get it.
@@ -261,7 +261,7 @@ impl State {
     /// Whether the source could measure its own depth, but the user turned that off.
     fn declines_own_depth(&self) -> bool {
         !self.may_have_depth()
-            && self.ways().iter().any(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo))
+            && self.depth_methods().iter().any(|depth_method| matches!(depth_method, DepthMethod::Measured | DepthMethod::Stereo))
     }
 
     /// Returns a short display name of the source; empty if unknown.

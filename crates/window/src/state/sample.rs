@@ -28,8 +28,8 @@ pub fn running(has_depth: bool) -> Source {
         is_live: true,
         kind: Kind::Camera,
         depth_from: if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing },
-        ways: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
-        way: has_depth.then_some(DepthMethod::Measured),
+        depth_methods: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
+        depth_method: has_depth.then_some(DepthMethod::Measured),
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,
     })

@@ -1,12 +1,12 @@
 //! The window's state as command-line options.
 
 use super::{Shown, State};
-use crate::services::Switch;
+use crate::services::CliOption;
 use bokehcam::look::Look;
 
 impl State {
     /// Returns the options that reproduce the window, besides those of the look; defaults are omitted.
-    pub fn switches(&self) -> Vec<Switch> {
+    pub fn switches(&self) -> Vec<CliOption> {
         let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
         let yes = |on: bool| on.then(|| "true".to_owned());
         let switches = [

@@ -126,8 +126,8 @@ pub fn show_source(
     let restored = restored.filter(|restored| *restored != look);
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let texts =
-        texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
-    texts.into_iter().for_each(texts::speak);
+        texts::load_translation(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
+    texts.into_iter().for_each(texts::set_translation);
     let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
     let mut state = initial_state(look, &source, window, stream.mirror, &memory);

@@ -63,7 +63,7 @@ fn esc_leaves_a_plate_that_is_not_there_yet() {
     let mut state = sample::state();
     state.source = sample::running(false);
     let Source::Running(running) = &mut state.source else { unreachable!("it runs") };
-    running.ways = vec![DepthMethod::Person, DepthMethod::Plate];
+    running.depth_methods = vec![DepthMethod::Person, DepthMethod::Plate];
     state.plate = Some(Step::KeepsMoving);
     let mut window = Window::of(state, (1280, 720));
     assert!(window.place_of("Find me without it").is_some());

@@ -255,7 +255,7 @@ fn in_full_screen_the_panel_hides_itself_and_comes_back() {
     window.wait(20.0);
     assert!(is_seen(&window));
     let mut window = Window::new();
-    (window.panel.stays, window.state.full_screen) = (true, true);
+    (window.panel.is_always_visible, window.state.full_screen) = (true, true);
     window.wait(20.0);
     assert!(is_seen(&window), "a screen reader looks for it");
 }

@@ -19,7 +19,7 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     }
     let declined = |state: &mut State| {
         let Source::Running(running) = &mut state.source else { panic!("it runs") };
-        running.ways.push(DepthMethod::Measured);
+        running.depth_methods.push(DepthMethod::Measured);
     };
     assert!(!texts(&declined).contains("Not now"), "it has depth, which was declined");
     texts(&|state| state.source = sample::running(false));

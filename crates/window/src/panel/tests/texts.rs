@@ -37,7 +37,7 @@ fn windows() -> Vec<Window> {
         &|state| state.help = true,
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
-            running.ways = vec![
+            running.depth_methods = vec![
                 DepthMethod::Measured,
                 DepthMethod::Stereo,
                 DepthMethod::Person,
@@ -117,9 +117,9 @@ fn the_table_has_all_texts_and_no_others() {
         texts::tr(does);
         texts::tr(keys);
     }
-    let english = table::english();
+    let english = table::english_table();
     let missing: Vec<String> =
-        table::seen().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
+        table::recorded_texts().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
     let lines: Vec<String> = missing.iter().map(|text| format!("{text:?} = \"\"")).collect();
     assert!(missing.is_empty(), "texts.toml has not:\n{}", lines.join("\n"));
     let gone: Vec<&String> = english.keys().filter(|text| !is_written(text)).collect();
@@ -129,7 +129,7 @@ fn the_table_has_all_texts_and_no_others() {
 #[test]
 fn what_is_said_while_it_runs_is_in_the_table_too() {
     let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
-    let english = table::english();
+    let english = table::english_table();
     let literal = |after: &str| {
         let text = after.trim_start().strip_prefix('"')?.split('"').next()?.to_owned();
         (text.contains(' ') && text.starts_with(char::is_uppercase)).then_some(text)
@@ -156,8 +156,8 @@ fn all_that_is_drawn_is_translated() {
         "Manual Mode",
         "Aperture Priority",
     ];
-    let english = table::english();
-    texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
+    let english = table::english_table();
+    texts::set_translation(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
     let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();
     let controls = ["Brightness", "White balance", "Auto exposure", "Exposure time"];
     let levels = ["draft", "fast", "balanced", "high", "best", "auto", "full"];

@@ -4,7 +4,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use super::Host;
-use crate::services::Browse;
+use crate::services::PathKind;
 use crate::session::Command;
 use crate::state::{Request, Update};
 use bokehcam::files::whole;
@@ -36,19 +36,19 @@ impl Host {
     }
 
     pub(super) fn report_choices(&mut self) {
-        let sources = self.start.services.sources();
-        let virtual_cameras = self.start.services.virtual_cameras();
+        let sources = self.start.services.list_sources();
+        let virtual_cameras = self.start.services.list_virtual_cameras();
         self.events.send_update(Update::Choices { sources, virtual_cameras });
         self.events.send_update(Update::Presets(self.start.services.settings().presets()));
     }
 
     /// Reports device changes, and reopens a missing source that has come back.
     fn check_devices(&mut self) {
-        if !self.start.services.devices_changed() {
+        if !self.start.services.have_devices_changed() {
             return;
         }
         self.report_choices();
-        let is_there = self.start.services.sources().iter().any(|choice| choice.name == self.start.source);
+        let is_there = self.start.services.list_sources().iter().any(|choice| choice.name == self.start.source);
         if self.live.is_none() && is_there && self.start.source.starts_with("/dev/") {
             self.open();
         }
@@ -56,18 +56,18 @@ impl Host {
 
     /// Reports an offered source as valid, or else why not; the current source continues.
     pub(super) fn offer(&self, name: String) {
-        match self.start.services.check(&name) {
+        match self.start.services.check_source_name(&name) {
             Ok(()) => self.events.send_update(Update::Offered(name)),
             Err(line) => self.events.note(line),
         }
     }
 
     /// Opens a file chooser on its own thread.
-    pub(super) fn browse(&self, what: Browse) {
+    pub(super) fn browse(&self, what: PathKind) {
         let (commands, events) = (self.commands.clone(), self.events.clone());
-        let pick = self.start.services.browse(what);
-        let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
-            Ok(Some(file)) if what == Browse::Behind => match BackgroundSetting::Image(file.into()).load() {
+        let choose_path = self.start.services.create_file_chooser(what);
+        let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match choose_path() {
+            Ok(Some(file)) if what == PathKind::Background => match BackgroundSetting::Image(file.into()).load() {
                 Ok(behind) => events.send_update(Update::Behind(behind)),
                 Err(error) => events.note(error.to_string()),
             },
@@ -82,7 +82,7 @@ impl Host {
 
     /// Reopens the camera with another frame size and rate.
     pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) {
-        self.start.services.choose_mode(&self.start.source, size, fps);
+        self.start.services.set_mode(&self.start.source, size, fps);
         self.stop();
         self.open();
     }

@@ -48,11 +48,11 @@ impl App {
             UserEvent::Control => self.run_remote_tasks(events),
             UserEvent::Access(event) => match (event.window_event, &mut self.gfx) {
                 (Access::InitialTreeRequested, _) => {
-                    self.panel.stays = true;
+                    self.panel.is_always_visible = true;
                     self.ctx.enable_accesskit();
                 }
                 (Access::AccessibilityDeactivated, _) => {
-                    self.panel.stays = false;
+                    self.panel.is_always_visible = false;
                     self.ctx.disable_accesskit();
                 }
                 (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use crate::lent::RemoteChanges;
+use crate::remote_changes::RemoteChanges;
 use crate::session::{CurrentShutter, SnapshotRequest};
 use crate::state::{Action, DepthMethod, Running, Source};
 use crate::window::{Control, UserEvent};
@@ -104,11 +104,11 @@ impl ControllableRun for Remote {
         self.run_on_window(move |app, events| app.change(&patch, &*rules, events))?
     }
 
-    fn set_depth_source(&self, way: &str) -> Result<(), Answer> {
-        let way = way.parse().map_err(Answer::invalid_request)?;
+    fn set_depth_source(&self, depth_method: &str) -> Result<(), Answer> {
+        let depth_method = depth_method.parse().map_err(Answer::invalid_request)?;
         self.run_on_window(move |app, events| {
-            app.check_depth_method(way)?;
-            app.perform(Action::DepthBy(way), events);
+            app.check_depth_method(depth_method)?;
+            app.perform(Action::DepthBy(depth_method), events);
             Ok(())
         })?
     }
@@ -144,22 +144,22 @@ impl App {
     }
 
     /// Checks that the source supports this depth method; the error lists those it supports.
-    fn check_depth_method(&self, way: DepthMethod) -> Result<(), Answer> {
-        let ways = self.state.ways();
-        if ways.contains(&way) {
+    fn check_depth_method(&self, depth_method: DepthMethod) -> Result<(), Answer> {
+        let depth_methods = self.state.depth_methods();
+        if depth_methods.contains(&depth_method) {
             return Ok(());
         }
-        let there = match ways {
+        let there = match depth_methods {
             [] => "it has no source of depth".to_owned(),
-            ways => format!("use {}", ways.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
+            methods => format!("use {}", methods.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
         };
-        Err(Answer::invalid_request(format!("{way} is not available for this source: {there}")))
+        Err(Answer::invalid_request(format!("{depth_method} is not available for this source: {there}")))
     }
 
     /// Returns the look to be saved: without changes by remote control.
     pub(super) fn look_to_save(&self) -> Look {
         let look = self.state.chosen_look();
-        self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.without(&look))
+        self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.remove_from(&look))
     }
 
     /// Saves the displayed frame, and sends the result to `answer`.
@@ -201,7 +201,7 @@ impl App {
             on: !state.off,
             source: state.source_name.clone(),
             size,
-            depth: state.way().map(|way| way.to_string()),
+            depth: state.depth_method().map(|depth_method| depth_method.to_string()),
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),

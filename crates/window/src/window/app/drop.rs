@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::App;
-use crate::dialog::name_of;
+use crate::dialog::path_to_name;
 use crate::state::Request;
 
 impl App {
@@ -13,7 +13,7 @@ impl App {
             self.state.note(format!("One source at a time: {} is left out.", path.display()));
             return self.on_input();
         }
-        match name_of(path) {
+        match path_to_name(path) {
             Ok(name) => self.session.send(Request::Offer(name)),
             Err(line) => self.state.note(line),
         }

@@ -89,7 +89,7 @@ impl App {
             (None, true) => {
                 self.watch = Some(self.demand.watch());
                 self.last_frame_at = Instant::now();
-                self.state.meters.restart();
+                self.state.meters.clear_recent();
             }
             (Some(_), false) => self.watch = None,
             (None, false) | (Some(_), true) => {}

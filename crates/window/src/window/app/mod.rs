@@ -122,7 +122,7 @@ impl App {
         let off = Arc::clone(&session.off);
         let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
         let clock = Clock::system();
-        state.meters.begin(clock.now_ns());
+        state.meters.set_start(clock.now_ns());
         let ctx = egui::Context::default();
         let fonts = calls::init_appearance(&ctx, theme, &proxy);
         Ok(Self {

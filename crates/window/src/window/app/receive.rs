@@ -31,7 +31,7 @@ impl App {
                     // A pending snapshot was meant for the previous source.
                     self.snapshot_due = false;
                     self.frames = Some(frames);
-                    self.state.meters.restart();
+                    self.state.meters.clear_recent();
                 }
                 SessionEvent::Blurred(blurred) => changed |= self.show_reblurred(*blurred),
                 SessionEvent::Copy(text) => {

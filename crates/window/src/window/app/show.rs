@@ -48,7 +48,7 @@ impl App {
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
-        let room = panel::room_px(&self.ctx);
+        let room = panel::picture_area_px(&self.ctx);
         let (area, part) = gfx.area(size, room, self.state.zoom, self.state.mirror);
         let canvas = Canvas { area, size, part };
         let input = gfx.input.take_egui_input(&gfx.window);
@@ -68,7 +68,7 @@ impl App {
             gfx.window.request_redraw();
         }
         // A change of the panel's size moves the picture and its overlays: lay out again.
-        if panel::room_px(&self.ctx) != room {
+        if panel::picture_area_px(&self.ctx) != room {
             self.layout_at = Some(self.laid_out);
             gfx.window.request_redraw();
         }
@@ -166,7 +166,7 @@ impl App {
         // If nothing was blurred, before and after are identical.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
-        let (area, part) = gfx.area(size, panel::room_px(&self.ctx), self.state.zoom, *mirror);
+        let (area, part) = gfx.area(size, panel::picture_area_px(&self.ctx), self.state.zoom, *mirror);
         let drawing = Drawing {
             area: if self.view.is_some() || self.state.off { area } else { Area::default() },
             part,

@@ -75,7 +75,7 @@ impl DepthMethod {
 
 impl fmt::Display for DepthMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::NAMES.iter().find(|(way, _)| way == self).map_or("", |(_, name)| name);
+        let name = Self::NAMES.iter().find(|(depth_method, _)| depth_method == self).map_or("", |(_, name)| name);
         f.write_str(name)
     }
 }
@@ -83,8 +83,8 @@ impl fmt::Display for DepthMethod {
 impl FromStr for DepthMethod {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let way = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(way, _)| *way);
-        way.ok_or_else(|| {
+        let depth_method = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(depth_method, _)| *depth_method);
+        depth_method.ok_or_else(|| {
             let names = Self::NAMES.map(|(_, name)| name).join(", ");
             format!("there is no source of depth '{text}': use one of {names}")
         })
