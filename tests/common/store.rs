@@ -1,7 +1,7 @@
 //! A settings store without a file.
 
 use bokehcam::look::{Look, presets::Preset};
-use bokehcam_window::services::{SettingsStore, CliOption};
+use bokehcam_window::services::{CliOption, SettingsStore};
 
 /// Has no presets and saves none; a command lists its own parts.
 pub struct NoStore;

@@ -96,21 +96,21 @@ fn direction_sign(context: Context) -> f32 {
 /// Returns the action of Esc: closes the topmost open item, one per press.
 fn close_topmost(state: &State) -> Option<Action> {
     if state.closing {
-        Some(Action::StayOpen)
+        Some(Action::CancelClose)
     } else if state.self_timer {
         Some(Action::SelfTimer(false))
     } else if state.help {
         Some(Action::Help(false))
-    } else if state.trouble.is_some() {
-        Some(Action::Dismiss)
+    } else if state.output_failure.is_some() {
+        Some(Action::DismissFailure)
     } else if let Some(depth_method) = state.method_without_plate() {
-        Some(Action::DepthBy(depth_method))
-    } else if state.offers_depth() && !state.bare {
-        Some(Action::DeclinePlate)
-    } else if state.is_demonstration() && !state.knows_demonstration && !state.bare {
-        Some(Action::KnowDemonstration)
-    } else if state.bare {
-        Some(Action::Bare(false))
+        Some(Action::SetDepthMethod(depth_method))
+    } else if state.offers_depth_methods() && !state.controls_hidden {
+        Some(Action::DeclineDepthOffer)
+    } else if state.is_demonstration() && !state.demonstration_dismissed && !state.controls_hidden {
+        Some(Action::DismissDemonstration)
+    } else if state.controls_hidden {
+        Some(Action::HideControls(false))
     } else if state.full_screen {
         Some(Action::FullScreen(false))
     } else if state.panel {
@@ -155,7 +155,7 @@ pub const GROUPS: [Group; 5] = [
                 "less blur, more blur",
                 |state, context| {
                     let factor = THIRD_STOP.powf(direction_sign(context));
-                    edit_look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
+                    edit_look(state, "key blur", |look| tweak::scale_blur(look, factor, context.size.1))
                 },
             ),
             bind_repeating(
@@ -165,13 +165,20 @@ pub const GROUPS: [Group; 5] = [
                 |state, context| {
                     let factor = THIRD_STOP.powf(direction_sign(context));
                     edit_look(state, "key f-number", |look| {
-                        tweak::f_number_by(look, factor, state.distance_m(), context.size)
+                        tweak::scale_f_number(look, factor, state.focus_distance_m(), context.size)
                     })
                 },
             ),
-            bind_repeating(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
-                edit_look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * direction_sign(context)))
-            }),
+            bind_repeating(
+                &[key(Key::Comma), key(Key::Period)],
+                ",  .",
+                "less in focus, more in focus",
+                |state, context| {
+                    edit_look(state, "key focal range", |look| {
+                        tweak::widen_focus_range(look, RANGE_STEP_M * direction_sign(context))
+                    })
+                },
+            ),
             bind_repeating(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
             bind_repeating(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
             bind_once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
@@ -180,7 +187,7 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "Focus",
         bindings: &[
-            bind_once(&[key(Key::T)], "T", "take a plate (the empty room)", |_, _| Some(Action::TakePlate)),
+            bind_once(&[key(Key::T)], "T", "take a plate (the empty room)", |_, _| Some(Action::CapturePlate)),
             bind_once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
                 edit_look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
@@ -198,7 +205,9 @@ pub const GROUPS: [Group; 5] = [
                 "Up, Down",
                 "move the point of focus, move the sharp band",
                 |state, context| {
-                    edit_look(state, "key arrows", |look| tweak::move_focus(look, 0.0, FOCUS_STEP * direction_sign(context)))
+                    edit_look(state, "key arrows", |look| {
+                        tweak::move_focus(look, 0.0, FOCUS_STEP * direction_sign(context))
+                    })
                 },
             ),
         ],
@@ -222,13 +231,18 @@ pub const GROUPS: [Group; 5] = [
                 state.transport.map(|_| Action::Seek(0))
             }),
             bind_once(&[key(Key::X)], "X", "actual pixels (100 %), whole picture", |state, context| {
-                Some(Action::Zoom(if state.zoom.factor == 0 { state.zoom.stepped(1, context.fit) } else { 0 }, None))
+                Some(Action::Zoom(
+                    if state.zoom.factor == 0 { state.zoom.next_factor(1, context.fit) } else { 0 },
+                    None,
+                ))
             }),
             bind_once(
                 &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
                 "Minus, Plus",
                 "smaller, larger: 100, 200, 400, 800 %",
-                |state, context| Some(Action::Zoom(state.zoom.stepped(direction_sign(context) as i32, context.fit), None)),
+                |state, context| {
+                    Some(Action::Zoom(state.zoom.next_factor(direction_sign(context) as i32, context.fit), None))
+                },
             ),
             bind_once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
             bind_once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, Shown::Depth)),
@@ -264,7 +278,9 @@ pub const GROUPS: [Group; 5] = [
                 Some(Action::Panel(!state.panel))
             }),
             bind_once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
-            bind_once(&[key(Key::H)], "H", "only the picture", |state, _| Some(Action::Bare(!state.bare))),
+            bind_once(&[key(Key::H)], "H", "only the picture", |state, _| {
+                Some(Action::HideControls(!state.controls_hidden))
+            }),
             bind_once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
                 Some(Action::FullScreen(!state.full_screen))
             }),
@@ -274,7 +290,9 @@ pub const GROUPS: [Group; 5] = [
                 &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
                 "Ctrl+−  Ctrl++",
                 "smaller text, larger text",
-                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(direction_sign(context)))),
+                |state, context| {
+                    Some(Action::TextScale(state.preferences.text_scale * TEXT_STEP.powf(direction_sign(context))))
+                },
             ),
             bind_once(&[ctrl(Key::Num0)], "Ctrl+0", "normal text size", |_, _| Some(Action::TextScale(1.0))),
             bind_once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
@@ -299,7 +317,7 @@ fn is_handled_by_controls(chord: Chord) -> bool {
 /// Whether a key may trigger this action now: nothing may change unseen beneath the help or the closing dialog.
 fn is_allowed(action: &Action, state: &State) -> bool {
     match action {
-        Action::Close | Action::StayOpen => true,
+        Action::Close | Action::CancelClose => true,
         Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
         _ => !state.help && !state.closing,
     }
@@ -333,7 +351,7 @@ pub fn action_for_event(event: &Event, state: &State, context: Context, focused:
         Some((binding, chord))
     });
     let (binding, chord) = found?;
-    if !state.habits.single_keys && is_single_key(binding.chords[chord]) {
+    if !state.preferences.single_keys && is_single_key(binding.chords[chord]) {
         return None;
     }
     // Esc closes the closing dialog even while one of its buttons has the focus.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::dialog;
-use super::services::{PathKind, OpenedSource, FileChooser, Services, SettingsStore, CliOption};
+use super::services::{CliOption, FileChooser, OpenedSource, PathKind, Services, SettingsStore};
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::camera_control::CameraControl;
@@ -45,9 +45,9 @@ pub struct System {
     /// Sources opened so far, most recent first: they stay in the list even if they are no cameras.
     opened: Vec<Choice>,
     /// Camera name with the frame size and rate chosen for it.
-    mode: Option<(String, Size, f64)>,
+    chosen_mode: Option<(String, Size, f64)>,
     /// Device nodes at the last check, and whether that check found a change.
-    nodes: (Vec<String>, bool),
+    device_nodes: (Vec<String>, bool),
     /// Values of the driver controls set by the user, by name.
     control_values: BTreeMap<String, i64>,
     /// Device of the camera opened last, if it has driver controls.
@@ -69,8 +69,8 @@ impl System {
             force: false,
             settings,
             opened: Vec::new(),
-            mode: None,
-            nodes: (devices::list_video_nodes(), false),
+            chosen_mode: None,
+            device_nodes: (devices::list_video_nodes(), false),
             control_values: BTreeMap::new(),
             camera: None,
             depth_method: None,
@@ -104,7 +104,7 @@ impl System {
         }
         // Only recordings and photos end.
         options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
-        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
+        if let Some((_, size, fps)) = self.chosen_mode.as_ref().filter(|(camera, ..)| camera == name) {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
         // A later look may need depth; without metric settings, relative depth is accepted.
@@ -133,15 +133,20 @@ impl System {
                 ..SingleCameraDepth::default()
             }),
             (
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 choice @ DepthChoice::SingleCamera(SingleCameraDepth { mono: Some(_), matte: Some(_), .. }),
             ) => choice.clone(),
-            _ => depth_method.choice(),
+            _ => depth_method.to_depth_choice(),
         }
     }
 
     /// Returns the depth methods of a source opened with `depth_method`, its own ones first.
-    fn list_depth_methods(&mut self, source: &Source, name: &SourceName, depth_method: Option<DepthMethod>) -> Vec<DepthMethod> {
+    fn list_depth_methods(
+        &mut self,
+        source: &Source,
+        name: &SourceName,
+        depth_method: Option<DepthMethod>,
+    ) -> Vec<DepthMethod> {
         let called = name.to_string();
         if depth_method.is_none() || self.own_depth_methods.0 != called {
             let mut own = Vec::new();
@@ -149,12 +154,14 @@ impl System {
                 // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
                     let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
-                    let has = |own: &mut Vec<DepthMethod>, is: bool, depth_method: DepthMethod| own.extend(is.then_some(depth_method));
+                    let has = |own: &mut Vec<DepthMethod>, is: bool, depth_method: DepthMethod| {
+                        own.extend(is.then_some(depth_method))
+                    };
                     has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), DepthMethod::Measured);
                     has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), DepthMethod::Stereo);
                 }
                 _ => own.extend(
-                    DepthMethod::of(source.depth_from, &SingleCameraDepth::default(), false)
+                    DepthMethod::from_origin(source.depth_from, &SingleCameraDepth::default(), false)
                         .filter(|depth_method| matches!(depth_method, DepthMethod::Measured | DepthMethod::Stereo)),
                 ),
             }
@@ -165,7 +172,7 @@ impl System {
             let installed = source::installed_networks();
             depth_methods.extend(installed.matte.is_some().then_some(DepthMethod::Person));
             depth_methods.extend(
-                (installed.matte.is_some() && installed.mono.is_some()).then_some(DepthMethod::PersonAndDistance),
+                (installed.matte.is_some() && installed.mono.is_some()).then_some(DepthMethod::PersonAndMonoDepth),
             );
         }
         // A plate is for live cameras without depth of their own.
@@ -195,7 +202,7 @@ impl Services for System {
         let installed = source::installed_networks();
         let lacks = match depth_method {
             DepthMethod::Person => installed.matte.is_none(),
-            DepthMethod::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
+            DepthMethod::PersonAndMonoDepth => installed.matte.is_none() || installed.mono.is_none(),
             DepthMethod::Measured | DepthMethod::Stereo | DepthMethod::Plate => false,
         };
         if lacks {
@@ -247,7 +254,7 @@ impl Services for System {
             DepthChoice::SingleCamera(chosen) if chosen.has_networks() => chosen.clone(),
             _ => source::installed_networks(),
         };
-        let usual = || DepthMethod::of(source.depth_from, &networks, source.guide.is_some());
+        let usual = || DepthMethod::from_origin(source.depth_from, &networks, source.guide.is_some());
         let depth_method = depth_method.or_else(usual).filter(|_| has_depth);
         depth_methods.extend(depth_method.filter(|depth_method| !depth_methods.contains(depth_method)));
         Ok(OpenedSource { name, source, has_depth, depth_methods, depth_method, notes, controls, camera })
@@ -255,9 +262,9 @@ impl Services for System {
 
     fn have_devices_changed(&mut self) -> bool {
         let nodes = devices::list_video_nodes();
-        let differ = nodes != self.nodes.0;
+        let differ = nodes != self.device_nodes.0;
         // Reports the change once more at the next check: a new node exists before its access rights are set.
-        let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
+        let again = std::mem::replace(&mut self.device_nodes, (nodes, differ)).1;
         differ || again
     }
 
@@ -277,7 +284,7 @@ impl Services for System {
     }
 
     fn set_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {
-        self.mode = Some((name.to_owned(), Size { width, height }, fps));
+        self.chosen_mode = Some((name.to_owned(), Size { width, height }, fps));
     }
 
     fn set_control(&mut self, control: &str, value: i64) -> Result<Vec<CameraControl>, String> {
@@ -316,12 +323,12 @@ impl Services for System {
                 self.control_values.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
         }
-        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == source) {
+        if let Some((_, size, fps)) = self.chosen_mode.as_ref().filter(|(camera, ..)| camera == source) {
             switches.push(("size".into(), format!("{}x{}", size.width, size.height)));
             switches.push(("fps".into(), format!("{}", (fps * 1000.0).round() / 1000.0)));
         }
         if let Some(depth_method) = self.depth_method {
-            switches.push(("depth".into(), depth_method.flag()));
+            switches.push(("depth".into(), depth_method.depth_option()));
         }
         self.settings.format_command(look, source, outputs, &switches)
     }

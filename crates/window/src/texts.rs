@@ -96,8 +96,9 @@ pub fn load_translation(language: Option<&str>) -> Result<Option<Table>, String>
     let Some(name) = language else {
         let Some(language) = environment_language() else { return Ok(None) };
         // The environment's language was not requested explicitly, so errors fall back to English.
-        let own = find_translation(&language)
-            .and_then(|path| read_translation(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok());
+        let own = find_translation(&language).and_then(|path| {
+            read_translation(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok()
+        });
         return Ok(own.or_else(|| load_built_in(&language)));
     };
     if ["en", "C", "POSIX"].contains(&name) {

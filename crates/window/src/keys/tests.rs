@@ -55,7 +55,7 @@ fn switches_toggle() {
         (Key::P, |state| state.panel),
         (Key::Space, |state| state.panel),
         (Key::I, |state| state.instruments),
-        (Key::H, |state| state.bare),
+        (Key::H, |state| state.controls_hidden),
         (Key::F, |state| state.full_screen),
         (Key::F11, |state| state.full_screen),
         (Key::F1, |state| state.help),
@@ -120,11 +120,11 @@ fn looks_change_by_keys() {
         Some(Action::Look { look, stroke: Some(_) }) => *look,
         other => panic!("{key:?}: {other:?}"),
     };
-    let amount = |key: Key| tweak::amount(&changed(key), 720).unwrap();
-    let now = tweak::amount(&state.look, 720).unwrap();
+    let amount = |key: Key| tweak::coc_fraction(&changed(key), 720).unwrap();
+    let now = tweak::coc_fraction(&state.look, 720).unwrap();
     assert!(amount(Key::OpenBracket) < now && amount(Key::CloseBracket) > now);
     let mut lens = state.clone();
-    lens.look.strength = bokehcam::look::Strength::Lens(tweak::LENS);
+    lens.look.strength = bokehcam::look::Strength::Lens(tweak::DEFAULT_LENS);
     let with_lens = |key: Key| match does(&lens, key, Modifiers::NONE) {
         Some(Action::Look { look, .. }) => *look,
         other => panic!("{key:?}: {other:?}"),
@@ -161,13 +161,13 @@ fn only_some_keys_repeat_and_some_belong_to_a_control_in_focus() {
 #[test]
 fn escape_closes_one_thing_after_the_other() {
     let mut state = state();
-    (state.help, state.bare, state.full_screen, state.panel) = (true, true, true, true);
+    (state.help, state.controls_hidden, state.full_screen, state.panel) = (true, true, true, true);
     let mut closed = Vec::new();
     while let Some(action) = does(&state, Key::Escape, Modifiers::NONE) {
         closed.push(action.clone());
         state.apply(action);
     }
-    let all = [Action::Help(false), Action::Bare(false), Action::FullScreen(false), Action::Panel(false)];
+    let all = [Action::Help(false), Action::HideControls(false), Action::FullScreen(false), Action::Panel(false)];
     assert_eq!(closed, all);
 }
 

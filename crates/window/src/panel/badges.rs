@@ -39,9 +39,9 @@ impl Badges {
             Some(bytes) => format!("{text}, {}", format_size(bytes)),
             None => text,
         };
-        self.change_since_s = state.between.then(|| self.change_since_s.unwrap_or(now_s));
+        self.change_since_s = state.is_transitional.then(|| self.change_since_s.unwrap_or(now_s));
         let is_late = self.change_since_s.is_some_and(|since_s| now_s - since_s >= MIN_SHOWN_S);
-        if state.between && !is_late {
+        if state.is_transitional && !is_late {
             ctx.request_repaint_after(Duration::from_secs_f64(MIN_SHOWN_S));
         }
         let all = [
@@ -56,7 +56,7 @@ impl Badges {
         }
         let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
         // Leaves room for the button that reopens the panel.
-        let reserved = if state.panel || state.bare { 0.0 } else { icons::ICON_SIZE + 14.0 };
+        let reserved = if state.panel || state.controls_hidden { 0.0 } else { icons::ICON_SIZE + 14.0 };
         let mut corner = picture_area(ctx).right_top() + vec2(-GAP - reserved, GAP);
         for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
             corner.y += draw_label(&painter, corner, Align2::RIGHT_TOP, &text, Some(color)).height() + 6.0;

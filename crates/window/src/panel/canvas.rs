@@ -3,8 +3,8 @@
 use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 
 use super::marks::{self, TiltHandle};
-use super::viewport::{Viewport, fit_scale};
 use super::state::{Action, Shown, State, tweak};
+use super::viewport::{Viewport, fit_scale};
 use crate::texts::tr;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Effect;
@@ -34,12 +34,19 @@ pub struct Gestures {
 impl Gestures {
     /// Handles the gestures on the picture and draws the marks on it. A touch that only reopens the panel (`is_wake_touch`) is
     /// not a click.
-    pub fn show(&mut self, ui: &mut Ui, state: &State, viewport: Viewport, is_wake_touch: bool, actions: &mut Vec<Action>) {
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &State,
+        viewport: Viewport,
+        is_wake_touch: bool,
+        actions: &mut Vec<Action>,
+    ) {
         // Not focusable with Tab: the arrow keys replace the click for keyboard users.
         let response = ui.interact(viewport.visible, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, tr("Picture: a click focuses there")));
         let line = drag_split_line(ui, state, &viewport);
-        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
+        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.controls_hidden;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
         if !on_line && !is_wake_touch {
             self.handle_click(&response, state, &viewport, actions);
@@ -70,17 +77,24 @@ impl Gestures {
             look.tilt.center_y = marks::center_y_through(&look.tilt, viewport.size, [x, y]);
         // A double click shortly after another click is reported as a triple click.
         } else if response.double_clicked() || response.triple_clicked() {
-            look.focus = tweak::track(x, y);
+            look.focus = tweak::focus_on_tracked(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         } else {
-            look.focus = tweak::point(x, y);
+            look.focus = tweak::focus_on_point(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         }
         push_look(actions, state, look, "picture click");
     }
 
     /// Drags the tilt-shift mark that was pressed.
-    fn drag_tilt(&mut self, ui: &Ui, response: &Response, state: &State, viewport: &Viewport, actions: &mut Vec<Action>) {
+    fn drag_tilt(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        state: &State,
+        viewport: &Viewport,
+        actions: &mut Vec<Action>,
+    ) {
         if response.drag_started() {
             let origin = ui.input(|input| input.pointer.press_origin());
             self.grabbed = origin.and_then(|at| marks::handle_at(&state.look.tilt, viewport, at));
@@ -109,7 +123,7 @@ impl Gestures {
             let step = self.zoom_log2.signum() as i32;
             self.zoom_log2 = 0.0;
             let size = (viewport.size.x as u32, viewport.size.y as u32);
-            actions.push(Action::Zoom(state.zoom.stepped(step, fit_scale(ui.ctx(), size)), center));
+            actions.push(Action::Zoom(state.zoom.next_factor(step, fit_scale(ui.ctx(), size)), center));
         }
     }
 
@@ -117,11 +131,11 @@ impl Gestures {
     fn draw_marks(&mut self, ui: &Ui, state: &State, viewport: &Viewport, is_tilt: bool, is_line_held: bool) {
         let painter = ui.painter().with_clip_rect(viewport.visible);
         let now = ui.input(|input| input.time);
-        if state.bare {
+        if state.controls_hidden {
             return;
         }
         // Auto-framing: outputs get this crop.
-        if let Some(part) = state.part.filter(|_| state.look.follow.zoom().is_some()) {
+        if let Some(part) = state.crop.filter(|_| state.look.follow.zoom().is_some()) {
             marks::draw_crop(&painter, viewport, &part);
         }
         if let Some(at) = state.split {
@@ -182,7 +196,7 @@ fn change_blur_by_wheel(ui: &Ui, state: &State, viewport: &Viewport, actions: &m
     let turned = ui.input(|input| if input.modifiers.any() { 0.0 } else { input.smooth_scroll_delta().y });
     if turned != 0.0 {
         let mut look = state.look.clone();
-        tweak::blur_by(&mut look, (turned / WHEEL_TO_DOUBLE).exp2(), viewport.size.y as u32);
+        tweak::scale_blur(&mut look, (turned / WHEEL_TO_DOUBLE).exp2(), viewport.size.y as u32);
         push_look(actions, state, look, "wheel");
     }
 }

@@ -3,9 +3,9 @@
 use egui::{Align2, Area, Context, Id, Label, Margin, Order, Rect, RichText, Ui, pos2};
 
 use super::dock::picture_area;
-use super::widgets::add_button;
 use super::state::Action;
 use super::theme::{Colors, GAP, card_frame, medium_font};
+use super::widgets::add_button;
 use crate::texts::tr;
 
 /// Draws a card in `area`, limited to `width` points and to the window's width. Returns its rectangle.

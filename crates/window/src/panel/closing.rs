@@ -3,9 +3,9 @@
 use egui::{Checkbox, Context, Id, Modal};
 
 use super::cards::{add_paragraph, add_title};
-use super::widgets::{Tooltip, add_button};
 use super::state::{Action, State};
 use super::theme::{Colors, GAP, PAD, card_frame};
+use super::widgets::{Tooltip, add_button};
 use crate::texts::tr;
 
 /// Warns that closing stops the virtual camera.
@@ -22,7 +22,10 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let modal = Modal::new(Id::unique("closing")).frame(card_frame(&colors)).show(ctx, |ui| {
         ui.set_max_width((ctx.content_rect().width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0));
         let is_recording = state.recording().is_some();
-        add_title(ui, if is_recording { "Stop recording and close?" } else { "Take the picture out of calls and close?" });
+        add_title(
+            ui,
+            if is_recording { "Stop recording and close?" } else { "Take the picture out of calls and close?" },
+        );
         add_paragraph(ui, &colors, if is_recording { "The video so far is saved." } else { CALL_WARNING });
         if is_recording && state.virtual_camera().is_some() {
             add_paragraph(ui, &colors, CALL_WARNING);
@@ -35,7 +38,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
                 stay.request_focus();
             }
             if stay.clicked() {
-                actions.push(Action::StayOpen);
+                actions.push(Action::CancelClose);
             }
             if add_button(ui, if is_recording { "Stop and close" } else { "Close" }, "Q again") {
                 // "Do not ask again" takes effect only on closing, not on cancelling.
@@ -47,6 +50,6 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         }
     });
     if modal.backdrop_response.clicked() {
-        actions.push(Action::StayOpen);
+        actions.push(Action::CancelClose);
     }
 }

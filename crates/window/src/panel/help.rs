@@ -4,9 +4,9 @@ use egui::{Context, Grid, Id, Key, Label, Modal, RichText, ScrollArea, Ui, vec2}
 
 use super::icons::{self, Icon};
 use super::keys::{GROUPS, Group};
-use super::widgets::add_switch;
 use super::state::{Action, State};
 use super::theme::{Colors, GAP, PAD, card_frame, medium_font};
+use super::widgets::add_switch;
 use crate::texts::tr;
 
 const GESTURES: [(&str, &str); 9] = [
@@ -43,11 +43,11 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
             });
         });
         let hint = "If off, shortcuts without Ctrl do nothing: for speech input";
-        if add_switch(ui, "Single keys", hint, state.habits.single_keys) {
-            actions.push(Action::SingleKeys(!state.habits.single_keys));
+        if add_switch(ui, "Single keys", hint, state.preferences.single_keys) {
+            actions.push(Action::SingleKeys(!state.preferences.single_keys));
         }
         let (asks, hint) = (
-            state.habits.ask_before_closing,
+            state.preferences.ask_before_closing,
             "While something is recorded or used in calls, closing the window asks first",
         );
         if add_switch(ui, "Ask before closing", hint, asks) {

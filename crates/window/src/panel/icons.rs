@@ -5,8 +5,8 @@ use std::f32::consts::TAU;
 use egui::{Color32, CornerRadius, Painter, Pos2, Rect, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo};
 use egui::{Role, vec2};
 
-use super::widgets::Tooltip;
 use super::theme::Colors;
+use super::widgets::Tooltip;
 use crate::texts::tr;
 
 /// Side of an icon button, in points.

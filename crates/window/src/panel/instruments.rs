@@ -57,7 +57,7 @@ impl Instruments {
             ui.label(RichText::new("fps").color(colors.weak));
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 let last = state.meters.samples().last().and_then(|bar| bar.quality);
-                let (color, letter) = quality_color(last, theme(ui));
+                let (color, letter) = quality_color(last, active_theme(ui));
                 let name = last.map_or(tr("no blur"), Quality::name);
                 ui.label(RichText::new(format!("{letter} {name}")).color(color).family(medium_font()));
             });
@@ -91,7 +91,7 @@ impl Instruments {
     }
 }
 
-fn theme(ui: &Ui) -> Theme {
+fn active_theme(ui: &Ui) -> Theme {
     if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light }
 }
 
@@ -141,7 +141,7 @@ fn draw_graph(ui: &mut Ui, state: &State, budget_ms: f32) {
     let top_ms = (1.35 * budget_ms).max(longest_ms.min(3.0 * budget_ms.max(1.0)) * 1.1).max(1.0);
     let step = plot.width() / GRAPH_FRAMES as f32;
     let bar_count = state.meters.samples().len();
-    let theme = theme(ui);
+    let theme = active_theme(ui);
     let mut mesh = Mesh::default();
     // Quality level of the current run of bars, and the x where the run begins.
     let mut run: Option<(Option<Quality>, f32)> = None;

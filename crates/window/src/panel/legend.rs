@@ -41,12 +41,12 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
     let bar = Rect::from_min_size(inner.min + vec2(0.0, 22.0), vec2(inner.width(), BAR_HEIGHT));
     match legend {
         Legend::Depth { near_m, far_m } => {
-            title(if state.known().is_relative { "Depth: far to near" } else { "Depth in metres" });
+            title(if state.source_depth().is_relative { "Depth: far to near" } else { "Depth in metres" });
             draw_ramp(painter, bar, |fraction| perceptual()[(fraction * 255.0) as usize]);
-            let in_metres = !state.known().is_relative;
-            for metres in nice_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
+            let in_metres = !state.source_depth().is_relative;
+            for metres in round_tick_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
                 let x = bar.left() + depth_fraction(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
-                draw_tick(painter, &colors, bar, x, &meters_label(metres));
+                draw_tick(painter, &colors, bar, x, &format_metres(metres));
             }
         }
         Legend::Coc { max_px } => {
@@ -127,7 +127,7 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
 }
 
 /// Returns round distances within a range, in metres from near to far, spaced so that their labels do not overlap.
-pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
+pub fn round_tick_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     const STEPS: [f32; 9] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0];
     // Minimum distance of two labels, as a fraction of the bar's width.
     const MIN_SPACING: f32 = 0.17;
@@ -142,6 +142,6 @@ pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     chosen
 }
 
-fn meters_label(metres: f32) -> String {
+fn format_metres(metres: f32) -> String {
     if metres < 10.0 && metres.fract() > 0.01 { format!("{metres:.1}") } else { format!("{metres:.0}") }
 }

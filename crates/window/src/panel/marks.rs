@@ -4,9 +4,9 @@
 
 use egui::{Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
-use super::viewport::Viewport;
 use super::state::tweak::rotate_band;
 use super::theme::{OVERLAY_COLOR, OVERLAY_OUTLINE, medium_font};
+use super::viewport::Viewport;
 use crate::texts::tr;
 use bokehcam::frame::crop::Crop;
 use bokehcam::look::Tilt;

@@ -12,8 +12,6 @@ mod instruments;
 mod legend;
 mod marks;
 mod notes;
-mod widgets;
-mod viewport;
 mod plate;
 mod probe;
 mod sections;
@@ -23,6 +21,8 @@ mod tests;
 mod theme;
 mod timer;
 mod transport;
+mod viewport;
+mod widgets;
 
 pub use dock::picture_area_px;
 pub use fonts::SystemFonts;
@@ -103,14 +103,14 @@ impl Panel {
         }
         ctx.accesskit_node_builder(egui::accesskit_root_id(), |node| node.set_label("bokehcam"));
         let first = actions.len();
-        self.set_text_scale(&ctx, state.habits.text_scale, actions);
+        self.set_text_scale(&ctx, state.preferences.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
         let viewport = Viewport::new(canvas, ctx.pixels_per_point(), state.mirror);
         let window = ctx.content_rect();
-        let awake = self.is_awake(ui, state.panel && !state.bare, viewport.is_none());
+        let awake = self.is_awake(ui, state.panel && !state.controls_hidden, viewport.is_none());
         let in_use = awake || self.is_always_visible || self.sheet.is_in_use(&ctx);
-        let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
-        let dock = is_shown.then(|| Dock::new(window, size, state.shows_more()));
+        let is_shown = !state.controls_hidden && state.panel && (in_use || !state.full_screen);
+        let dock = is_shown.then(|| Dock::new(window, size, state.is_expanded()));
         // Must precede keys and gestures: their zoom steps depend on the current layout.
         dock::set_picture_area(&ctx, dock.map_or(window, |dock| dock.picture_area));
         self.read_keys(ui, state, size, actions);
@@ -127,7 +127,7 @@ impl Panel {
         }
         let mut bottom = 0.0;
         self.sheet.show(&ctx, state, dock, size, actions);
-        if !state.bare {
+        if !state.controls_hidden {
             if awake && !state.panel {
                 sheet::show_reopen_button(&ctx, actions);
             }
@@ -168,7 +168,9 @@ impl Panel {
     /// Restores the focus once no modal covers the window any more.
     fn restore_focus(&mut self, ctx: &Context, covered: bool) {
         match (std::mem::replace(&mut self.covered, covered), covered) {
-            (true, false) => self.last_focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id))),
+            (true, false) => {
+                self.last_focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id)))
+            }
             (false, false) => self.last_focused = ctx.memory(|memory| memory.focused()),
             (_, true) => {}
         }
@@ -187,7 +189,8 @@ impl Panel {
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
         let context = keys::Context { size, fit: viewport::fit_scale(ctx, size), chord: 0 };
         ui.input(|input| {
-            actions.extend(input.events.iter().filter_map(|event| keys::action_for_event(event, state, context, focused)));
+            actions
+                .extend(input.events.iter().filter_map(|event| keys::action_for_event(event, state, context, focused)));
         });
     }
 
@@ -235,7 +238,7 @@ impl Panel {
         let changed_s = self.stroke_s?;
         if released || !down && now_s - changed_s > RELEASE_DELAY_S {
             self.stroke_s = None;
-            return Some(Action::Settle);
+            return Some(Action::EndStroke);
         }
         None
     }

@@ -43,14 +43,14 @@ impl NoteTimes {
         let mut stack = CardStack { ctx, bottom: bottom + GAP };
         timer.show(&mut stack, state, actions);
         plate::show(&mut stack, state, actions);
-        if state.is_demonstration() && !state.bare && !state.knows_demonstration {
-            let buttons = [("OK", "Esc", Action::KnowDemonstration)];
+        if state.is_demonstration() && !state.controls_hidden && !state.demonstration_dismissed {
+            let buttons = [("OK", "Esc", Action::DismissDemonstration)];
             stack.add_buttons("demonstration", 460.0, DEMONSTRATION, buttons, actions);
         }
         add_banner(&mut stack, state, actions);
-        if let Some(why) = &state.trouble {
+        if let Some(why) = &state.output_failure {
             let [title, why] = failure_texts(why);
-            stack.add_buttons("trouble", 460.0, [title, why], [("OK", "Esc", Action::Dismiss)], actions);
+            stack.add_buttons("trouble", 460.0, [title, why], [("OK", "Esc", Action::DismissFailure)], actions);
         }
         plate::show_offer(&mut stack, state, actions);
         let now_s = ctx.input(|input| input.time);

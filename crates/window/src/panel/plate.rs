@@ -4,9 +4,9 @@ use egui::{ProgressBar, RichText};
 
 use super::cards::{CardStack, add_paragraph};
 use super::dock::picture_area;
-use super::widgets::add_button;
 use super::state::{Action, State};
 use super::theme::medium_font;
+use super::widgets::add_button;
 use crate::texts::tr;
 use bokehcam::depth::plate::Step;
 
@@ -14,14 +14,14 @@ const WIDTH: f32 = 420.0;
 
 /// Draws the offer of depth methods, if the source has no depth.
 pub fn show_offer(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
-    if !state.offers_depth() || state.bare {
+    if !state.offers_depth_methods() || state.controls_hidden {
         return;
     }
-    let network = ("Find me with a small network", "It separates a person from the background", Action::FindMe);
+    let network = ("Find me with a small network", "It separates a person from the background", Action::SegmentPerson);
     let plate =
-        ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::TakePlate);
+        ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::CapturePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());
-    let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
+    let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclineDepthOffer)]);
     // Omits the explanation if it would cover a small picture.
     let is_small = picture_area(stack.ctx).height() < 360.0;
     let why = if is_small { "" } else { "Nothing is known about depth here, so everything is blurred." };
@@ -58,10 +58,11 @@ pub fn show(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
         }
         add_paragraph(ui, colors, why);
         if step == Step::Mismatched && add_button(ui, "Take another plate", "T") {
-            actions.push(Action::TakePlate);
+            actions.push(Action::CapturePlate);
         }
-        if let Some(depth_method) = state.method_without_plate().filter(|_| add_button(ui, "Find me without it", "Esc")) {
-            actions.push(Action::DepthBy(depth_method));
+        if let Some(depth_method) = state.method_without_plate().filter(|_| add_button(ui, "Find me without it", "Esc"))
+        {
+            actions.push(Action::SetDepthMethod(depth_method));
         }
     });
 }

@@ -5,10 +5,10 @@ use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 use super::cards;
 use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
-use super::widgets::truncate_start;
 use super::sections::{self, PresetEditor, Sheet, Thumbnails, first};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD};
+use super::widgets::truncate_start;
 use crate::texts::{tr, tr_with};
 
 /// State of the panel between frames.
@@ -62,7 +62,7 @@ impl PanelState {
             theme::card_frame(&colors).show(ui, |ui| {
                 let inner = (panel.size() - Vec2::splat(2.0 * (PAD + LINE))).max(Vec2::splat(1.0));
                 ui.set_width(inner.x);
-                let more = state.shows_more();
+                let more = state.is_expanded();
                 let scroll = ScrollArea::vertical().max_height(inner.y.max(20.0)).auto_shrink([false, true]);
                 scroll.show(ui, |ui| {
                     let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
@@ -82,7 +82,7 @@ impl PanelState {
             });
         });
         // The status line changes without any input.
-        if matches!(state.source, Source::Running(_)) && state.shows_more() && !state.stands_still() {
+        if matches!(state.source, Source::Running(_)) && state.is_expanded() && !state.can_pause_pipeline() {
             ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
         self.rect = Some(drawn.response.rect);
@@ -124,7 +124,7 @@ fn add_status(ui: &mut Ui, state: &State) {
         // Shortened, to leave room for the focus distance.
         parts.push(truncate_start(&running.label, 34));
     }
-    let focused = state.look.effect.follows_depth() && !state.known().is_relative;
+    let focused = state.look.effect.follows_depth() && !state.source_depth().is_relative;
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
         parts.push(tr_with("focused at {} m", &[&format!("{metres:.2}")]));
     }

@@ -70,7 +70,7 @@ pub const OVERLAY_OUTLINE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 1
 
 impl Colors {
     /// Returns the colours of a theme.
-    pub fn for_theme(: Theme) -> Self {
+    pub fn for_theme(theme: Theme) -> Self {
         match theme {
             Theme::Dark => DARK,
             Theme::Light => LIGHT,

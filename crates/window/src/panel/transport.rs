@@ -56,12 +56,12 @@ impl TransportBar {
                     }
                 }
                 let times = format!("{} / {}", format_time(transport.time_ns), format_time(transport.length_ns));
-                let frame = tr_with("Frame {} of {}", &[&(transport.place + 1), &transport.frames]);
+                let frame = tr_with("Frame {} of {}", &[&(transport.frame + 1), &transport.frames]);
                 let shows_time = width >= MIN_TIME_WIDTH;
                 let text = egui::RichText::new(if shows_time { &times } else { "" }).monospace().size(12.5);
                 let label = ui.label(text).on_hover_text(&frame);
                 ui.spacing_mut().slider_width = (ui.available_width() - 6.0).max(20.0);
-                let mut place = transport.place;
+                let mut place = transport.frame;
                 let line = Slider::new(&mut place, 0..=transport.frames.saturating_sub(1)).show_value(false);
                 let line = ui.add(line).labelled_by(label.id);
                 let is_moved = line.changed();

@@ -17,7 +17,7 @@ use bokehcam::pipeline::View;
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 use bokehcam_lab::synthetic::Synthetic;
-use bokehcam_window::services::{OpenedSource, Services, SettingsStore, CliOption};
+use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod, Source, Update};
 
 use super::heard::{self, Heard};
@@ -34,7 +34,7 @@ struct Small {
 struct Film(Arc<Mutex<Vec<String>>>, String);
 
 impl Sink for Film {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         if self.1 == "fills up" {
             return Err(SinkError::Exists { path: "the disk is full now".into() });
         }

@@ -13,7 +13,7 @@ use crate::terminal::print_to_stdout;
 use bokehcam::look::Value;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch};
-use bokehcam_window::services::{SettingsStore, CliOption};
+use bokehcam_window::services::{CliOption, SettingsStore};
 
 /// The settings file, and the settings of the command line.
 pub(super) struct FileStore {

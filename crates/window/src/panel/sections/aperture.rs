@@ -6,8 +6,8 @@ use egui::{
 use egui::{Role, WidgetInfo, pos2};
 
 use super::Sheet;
-use crate::panel::widgets::{RadioGroup, Tooltip, Number, add_number};
 use crate::panel::theme::Colors;
+use crate::panel::widgets::{Number, RadioGroup, Tooltip, add_number};
 use crate::texts::tr;
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 

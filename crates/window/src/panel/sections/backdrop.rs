@@ -3,7 +3,7 @@
 use egui::{Role, Ui, WidgetInfo};
 
 use super::Sheet;
-use crate::panel::widgets::{Tooltip, Number, add_dropdown, add_path, add_remark, add_switch};
+use crate::panel::widgets::{Number, Tooltip, add_dropdown, add_path, add_remark, add_switch};
 use crate::services::PathKind;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
@@ -62,7 +62,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Background::Blur => {}
         Background::Picture(picture) => {
             picture.file.iter().for_each(|file| add_path(ui, &file.display().to_string()));
-            sheet.add_button(ui, "Choose picture…", "Another picture of your own", Action::Browse(PathKind::Background));
+            sheet.add_button(
+                ui,
+                "Choose picture…",
+                "Another picture of your own",
+                Action::Browse(PathKind::Background),
+            );
         }
         Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
@@ -84,7 +89,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     if let Some(zoom) = zoom {
         let how =
             Number::new("Largest zoom", "Largest magnification of the subject", MIN_ZOOM..=FramingZoom::MAX_ZOOM, 1);
-        sheet.add_number(ui, &how.with_affixes("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
+        sheet
+            .add_number(ui, &how.with_affixes("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
         add_remark(ui, "Recordings and calls show the part in the dashed line; this window shows the whole picture.");
     }
 }

@@ -23,7 +23,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.stroke = Some("effect");
     }
     if !has_depth && matches!(sheet.state.source, Source::Running(_)) {
-        add_remark(ui, sheet.state.no_depth());
+        add_remark(ui, sheet.state.no_depth_advice());
     }
     if sheet.look.effect == Effect::TiltShift {
         let Tilt { center_y, band, angle_deg } = sheet.look.tilt;

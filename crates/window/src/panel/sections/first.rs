@@ -67,7 +67,7 @@ fn add_portrait_switch(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// Adds the slider for the blur strength.
 fn add_blur_slider(ui: &mut Ui, sheet: &mut Sheet) {
-    let focus_m = sheet.state.distance_m();
+    let focus_m = sheet.state.focus_distance_m();
     let fraction = tweak::blur_fraction(&sheet.look, focus_m, sheet.size);
     let enabled = sheet.look.effect != Effect::None;
     ui.add_enabled_ui(enabled, |ui| {
@@ -77,7 +77,10 @@ fn add_blur_slider(ui: &mut Ui, sheet: &mut Sheet) {
         let max_percent = MAX_COC_PER_HEIGHT * 100.0;
         let mut percent = (fraction * 100.0).min(max_percent);
         let slider = ui.add(Slider::new(&mut percent, 0.0..=max_percent).show_value(false)).labelled_by(name.id);
-        if slider.tooltip("How much the background is blurred. The mouse wheel over the picture does the same").changed() {
+        if slider
+            .tooltip("How much the background is blurred. The mouse wheel over the picture does the same")
+            .changed()
+        {
             tweak::set_blur_fraction(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
             sheet.mark_changed(true, "Amount of blur");
         }
@@ -134,7 +137,7 @@ fn add_virtual_camera_switch(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// Adds the button that expands the panel.
 fn add_more_button(ui: &mut Ui, sheet: &mut Sheet) {
-    let open = sheet.state.shows_more();
+    let open = sheet.state.is_expanded();
     let text = tr_with(if open { "{} Less" } else { "{} More" }, &[&if open { "−" } else { "+" }]);
     let button = Button::new(text).truncate().min_size(vec2(ui.available_width(), CELL));
     let button = ui.add(button).tooltip("All other settings");

@@ -6,8 +6,8 @@ use egui::{
 };
 
 use super::Sheet;
-use crate::panel::widgets::{RadioGroup, Tooltip, add_button, add_remark, set_accessible_name};
 use crate::panel::theme::{Colors, medium_font};
+use crate::panel::widgets::{RadioGroup, Tooltip, add_button, add_remark, set_accessible_name};
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
 use bokehcam::look::Effect;
@@ -153,7 +153,12 @@ fn show_delete_dialog(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
 }
 
 /// Adds a name field with buttons. Returns true if confirmed, false if cancelled, `None` while open.
-fn add_name_field(ui: &mut Ui, editing: &mut PresetEditor, verb: &str, (by_enter, is_cancelled): (bool, bool)) -> Option<bool> {
+fn add_name_field(
+    ui: &mut Ui,
+    editing: &mut PresetEditor,
+    verb: &str,
+    (by_enter, is_cancelled): (bool, bool),
+) -> Option<bool> {
     ui.horizontal_wrapped(|ui| {
         let width = ui.available_width().min(140.0);
         let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(width).char_limit(40);

@@ -17,8 +17,8 @@ pub use looks::PresetEditor;
 
 use egui::{Key, Ui};
 
-use super::widgets::{Number, add_button, add_choice, add_number, add_foldable_section, add_switch};
 use super::state::{Action, State};
+use super::widgets::{Number, add_button, add_choice, add_foldable_section, add_number, add_switch};
 use bokehcam::look::{Effect, Look};
 
 /// Data that the sections read and change while they are drawn.
@@ -95,7 +95,7 @@ impl Sheet<'_> {
 
     /// Whether depth is relative, without metres.
     fn is_relative(&self) -> bool {
-        self.state.known().is_relative
+        self.state.source_depth().is_relative
     }
 
     fn follows_depth(&self) -> bool {
@@ -138,7 +138,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor, thumbnai
 
 /// Draws a section, folded as the user left it; `open` is the default.
 fn add_section(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
-    let open = sheet.state.habits.sections.get(name).copied().unwrap_or(open);
+    let open = sheet.state.preferences.sections.get(name).copied().unwrap_or(open);
     if add_foldable_section(ui, name, open, |ui| body(ui, sheet)) {
         sheet.push_action(Action::Section(name, !open));
     }

@@ -17,11 +17,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let hint = "No picture leaves this program, and the camera is off: others see a still card";
     sheet.add_switch(ui, "Camera off", hint, state.off, Action::Off);
     let hint = "Also saves the picture before the blur and its depth: `render --like` makes the snapshot again";
-    sheet.add_switch(ui, "Reproducible snapshots", hint, state.habits.keep_sources, Action::KeepSources);
+    sheet.add_switch(ui, "Reproducible snapshots", hint, state.preferences.keep_sources, Action::KeepSources);
     ui.horizontal_wrapped(|ui| {
         let hint = "Copy the equivalent command line to the clipboard (K)";
         sheet.add_button(ui, "Copy command", hint, Action::CopyCommand);
-        if let Some(folder) = &state.kept_in {
+        if let Some(folder) = &state.saved_in {
             let open = ui.button(tr("Open folder")).on_hover_text(folder.display().to_string());
             if open.clicked() {
                 sheet.push_action(Action::OpenFolder);

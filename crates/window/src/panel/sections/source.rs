@@ -18,7 +18,7 @@ const DEPTH_METHODS: [(&str, &str, DepthMethod); 5] = [
         "Person and distance",
         "Also, another network estimates the distance of everything \
                              else",
-        DepthMethod::PersonAndDistance,
+        DepthMethod::PersonAndMonoDepth,
     ),
     ("Empty room", "A picture of the room without you: step out for four seconds (T)", DepthMethod::Plate),
 ];
@@ -56,7 +56,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
                     |_| true,
                 );
                 if let Some(method) = chosen.flatten().filter(|method| Some(*method) != running.depth_method) {
-                    sheet.push_action(Action::DepthBy(method));
+                    sheet.push_action(Action::SetDepthMethod(method));
                 }
             }
         }
@@ -70,7 +70,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.add_button(ui, "Open photo…", hint, Action::Browse(PathKind::Photo));
         if state.plate.is_some() {
             let hint = "A picture of the room without you; the camera must not move (T)";
-            sheet.add_button(ui, "Take another plate", hint, Action::TakePlate);
+            sheet.add_button(ui, "Take another plate", hint, Action::CapturePlate);
         }
     });
 }

@@ -69,13 +69,13 @@ fn they_do_what_they_say() {
     assert_eq!(window.click_on("Use in calls"), [Action::VirtualCamera(Some("/dev/video9".into()))]);
     assert_eq!(window.click_on("Use in calls"), [Action::VirtualCamera(None)]);
     window.click_on("+ More");
-    assert!(window.state.shows_more() && window.place_of("Save as…").is_some());
+    assert!(window.state.is_expanded() && window.place_of("Save as…").is_some());
     window.click_on("− Less");
     assert!(window.place_of("Save as…").is_none());
     let before = window.state.look.clone();
     let slider = controls(&mut window).into_iter().find(|(role, ..)| *role == Role::Slider).unwrap().2;
     window.drag(slider.center(), slider.right_center());
-    let amount = |look| crate::state::tweak::amount(look, 720).unwrap();
+    let amount = |look| crate::state::tweak::coc_fraction(look, 720).unwrap();
     assert!(amount(&window.state.look) > 1.5 * amount(&before));
 }
 
@@ -84,15 +84,15 @@ fn without_depth_the_switch_asks_how_it_may_be_known() {
     let mut state = first();
     state.apply_update(crate::state::Update::Source(sample::running(false)));
     assert_eq!(state.look.effect, Effect::Blur, "nobody knows whom to keep sharp");
-    state.declined_plate = true;
+    state.depth_offer_declined = true;
     let mut window = Window::of(state, (1280, 720));
     window.click_on("Portrait");
-    assert_eq!((window.state.look.effect, window.state.offers_depth()), (Effect::Blur, true));
+    assert_eq!((window.state.look.effect, window.state.offers_depth_methods()), (Effect::Blur, true));
     window.wait(0.1);
-    assert_eq!(window.click_on("Find me with a small network"), [Action::FindMe]);
-    assert_eq!(window.click_on("Show me the empty room"), [Action::TakePlate]);
+    assert_eq!(window.click_on("Find me with a small network"), [Action::SegmentPerson]);
+    assert_eq!(window.click_on("Show me the empty room"), [Action::CapturePlate]);
     window.press(Key::Escape, Modifiers::NONE);
-    assert!(window.state.declined_plate && window.state.panel, "Esc closes the question alone");
+    assert!(window.state.depth_offer_declined && window.state.panel, "Esc closes the question alone");
 }
 
 #[test]
@@ -102,7 +102,10 @@ fn the_panel_is_never_on_the_picture() {
             for more in [false, true] {
                 let window = Rect::from_min_size(pos2(0.0, 0.0), egui::vec2(size.0 as f32, size.1 as f32));
                 let dock = Dock::new(window, picture, more);
-                assert!(window.contains_rect(dock.panel) && window.contains_rect(dock.picture_area), "{size:?}: {dock:?}");
+                assert!(
+                    window.contains_rect(dock.panel) && window.contains_rect(dock.picture_area),
+                    "{size:?}: {dock:?}"
+                );
                 assert!(!dock.panel.intersects(dock.picture_area), "{size:?}: {dock:?}");
                 assert!(dock.picture_area.area() > 0.3 * window.area(), "{size:?}: {dock:?}");
             }
@@ -165,10 +168,10 @@ fn in_german_nothing_is_cut_off_at_any_size() {
                 DepthMethod::Measured,
                 DepthMethod::Stereo,
                 DepthMethod::Person,
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 DepthMethod::Plate,
             ];
-            state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
+            state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::DEFAULT_LENS);
             (state.mirror, state.split) = (true, Some(0.5));
             // As much as fits the panel's height.
             let mut window = Window::of(state, size);

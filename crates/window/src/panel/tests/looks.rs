@@ -131,8 +131,8 @@ fn pictures() {
         });
     }
     shot("large", Theme::Dark, &|state| {
-        state.habits.text_scale = 1.8;
-        state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
+        state.preferences.text_scale = 1.8;
+        state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::DEFAULT_LENS);
     });
     shot("help", Theme::Dark, &|state| state.help = true);
     shot("help-light", Theme::Light, &|state| state.help = true);
@@ -142,7 +142,7 @@ fn pictures() {
     for (name, theme) in [("recording", Theme::Dark), ("recording-light", Theme::Light)] {
         shot(name, theme, &|state| {
             let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
-            state.transport = Some(Transport { place: 280, frames: 738, time_ns, length_ns });
+            state.transport = Some(Transport { frame: 280, frames: 738, time_ns, length_ns });
             state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
             state.note("holiday.jpg: a photo, a single still frame, with the depth beside it");
         });

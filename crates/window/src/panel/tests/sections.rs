@@ -59,7 +59,7 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
         file: Some("wall.jpg".into()),
         image: ColorImage::new(2, 2),
     }));
-    let request = window.state.apply_update(Update::Behind(wall.clone()));
+    let request = window.state.apply_update(Update::Background(wall.clone()));
     assert!(matches!(request, Some(Request::Look(look)) if look.background == wall));
     window.wait(0.1);
     assert!(window.place_of("wall.jpg").is_some());

@@ -16,14 +16,14 @@ fn windows() -> Vec<Window> {
     let changes: [&dyn Fn(&mut State); 17] = [
         &|_| {},
         &|state| {
-            state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
-            (state.self_timer, state.kept_in, state.frozen) = (true, Some("gone".into()), true);
-            (state.mirror, state.between) = (true, true);
+            state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
+            (state.self_timer, state.saved_in, state.frozen) = (true, Some("gone".into()), true);
+            (state.mirror, state.is_transitional) = (true, true);
         },
         &|state| state.look.effect = Effect::TiltShift,
-        &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
+        &|state| (state.look.focus, state.look.strength) = (tweak::focus_on_point(0.5, 0.5), Strength::Percent(0.0)),
         &|state| {
-            state.look.strength = Strength::Lens(tweak::LENS);
+            state.look.strength = Strength::Lens(tweak::DEFAULT_LENS);
             state.look.aperture.shape = bokehcam::bokeh::aperture::Shape::Ring { inner: 0.5 };
         },
         &|state| {
@@ -41,7 +41,7 @@ fn windows() -> Vec<Window> {
                 DepthMethod::Measured,
                 DepthMethod::Stereo,
                 DepthMethod::Person,
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 DepthMethod::Plate,
             ];
             (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
@@ -50,7 +50,7 @@ fn windows() -> Vec<Window> {
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
             running.name = "demo".into();
-            (state.look.focus_range_m, state.trouble) = (0.5, Some("No space left on device: x; kept".into()));
+            (state.look.focus_range_m, state.output_failure) = (0.5, Some("No space left on device: x; kept".into()));
             state.apply(Action::Section("More", false));
         },
         &|state| {
@@ -69,7 +69,7 @@ fn windows() -> Vec<Window> {
             state.source = Source::Lost("gone".into());
             state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MAX_BINS] });
         },
-        &|state| (state.source, state.trouble) = (Source::Ended, Some("gone".into())),
+        &|state| (state.source, state.output_failure) = (Source::Ended, Some("gone".into())),
         &|state| (state.source, state.virtual_cameras) = (Source::Opening, Vec::new()),
     ];
     let mut windows = Vec::new();

@@ -15,7 +15,7 @@ use bokehcam::source::devices::Choice;
 use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
 use bokehcam_lab::synthetic::Synthetic;
-use bokehcam_window::services::{OpenedSource, Services, SettingsStore, CliOption};
+use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod};
 use bokehcam_window::system::System;
 
@@ -66,7 +66,16 @@ impl Services for Plug {
                     vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
                 let camera = Camera { modes, faces_user: true, is_relative: false };
                 let (notes, controls) = (Vec::new(), Vec::new());
-                Ok(OpenedSource { name, source, has_depth, depth_methods: Vec::new(), depth_method, notes, controls, camera })
+                Ok(OpenedSource {
+                    name,
+                    source,
+                    has_depth,
+                    depth_methods: Vec::new(),
+                    depth_method,
+                    notes,
+                    controls,
+                    camera,
+                })
             }
             _ => self.system.open(name, depth_method),
         }

@@ -8,7 +8,7 @@ use crate::state::Request;
 
 impl App {
     /// Offers a dropped path as a source; only the first of several.
-    pub(super) fn on_drop(&mut self, path: &Path) {
+    pub(super) fn on_file_dropped(&mut self, path: &Path) {
         if std::mem::replace(&mut self.has_dropped, true) {
             self.state.note(format!("One source at a time: {} is left out.", path.display()));
             return self.on_input();
