@@ -9,7 +9,7 @@ use bokehcam::{look::Look, pipeline, source::Options, source::Source};
 struct Brightness;
 
 impl Sink for Brightness {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let sum: u64 = frame.rgb.iter().map(|&value| u64::from(value)).sum();
         println!("{:6.3} s: {}", time_ns as f64 / 1e9, sum / frame.rgb.len() as u64);
         Ok(ControlFlow::Continue(()))

@@ -91,7 +91,7 @@ impl<R: ControllableRun + 'static> Controller<R> {
     /// card.
     fn switch_and_wait(&self, on: Option<bool>) -> Result<Option<String>, Answer> {
         match (self.run.switch_pictures(on)?, self.run.shutter()) {
-            (false, Some(shutter)) => shutter.wait_covered().map_err(|error| Answer::failed(error.to_string())),
+            (false, Some(shutter)) => shutter.wait_for_card().map_err(|error| Answer::failed(error.to_string())),
             _ => Ok(None),
         }
     }

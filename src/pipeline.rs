@@ -123,13 +123,13 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
 
     // A source with a known number of frames was stopped before its end.
     let is_cut = stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
-    let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
-    let (outputs, nodes) = (sink.outputs(), sink.nodes());
+    let ending = if ended.is_err() || is_cut { Ending::Truncated } else { Ending::Complete };
+    let (outputs, nodes) = (sink.output_counters(), sink.node_counters());
     let finished = run_guarded("sink", has_ended, move || Ok(sink.finish(ending)?));
     // Only now have the outputs written all frames.
     let about = About {
-        outputs: sink::read(&outputs),
-        pipewire: sink::read(&nodes),
+        outputs: sink::read_counters(&outputs),
+        pipewire: sink::read_counters(&nodes),
         elapsed_ns: shared.clock.now_ns() - began_ns,
         cpu_ns: clock::process_cpu_ns() - cpu_ns,
         ..about

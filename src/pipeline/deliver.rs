@@ -55,7 +55,7 @@ impl<'a> Stage<'a> {
             self.shared.wants_yuyv.store(wants_yuyv, Ordering::Relaxed);
             let mut frame = match self.receive_next(&mut from) {
                 Received::Item(frame) => frame,
-                Received::Nothing => match self.sink.repeat()? {
+                Received::Nothing => match self.sink.repeat_frame()? {
                     ControlFlow::Continue(shown) => {
                         self.times.repeats += u64::from(shown);
                         continue;
@@ -93,7 +93,7 @@ impl<'a> Stage<'a> {
             log_frame(frame.stamp.index, &blurred.coc, &frame.trace);
             let quality = frame.trace.quality;
             // A frame that the sink does not keep counts as delivered once the viewer took it.
-            let kept = was_given && self.sink.keeps();
+            let kept = was_given && self.sink.has_outputs();
             let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
             done.into_iter().for_each(|ticket| tally.delivered(ticket));
@@ -162,13 +162,13 @@ impl<'a> Stage<'a> {
         time_ns: u64,
     ) -> Result<ControlFlow<(), bool>, SinkError> {
         let flow = if let Some(yuyv) = picture.yuyv_mut() {
-            self.sink.captured(captured_ns);
-            self.sink.put_yuyv(yuyv, time_ns)?
+            self.sink.set_capture_time(captured_ns);
+            self.sink.write_yuyv(yuyv, time_ns)?
         } else if let Some(whole) = picture.memory() {
-            self.sink.captured(captured_ns);
-            self.sink.put(if is_cropped { &self.cropped } else { whole }, time_ns)?
+            self.sink.set_capture_time(captured_ns);
+            self.sink.write_frame(if is_cropped { &self.cropped } else { whole }, time_ns)?
         } else {
-            self.sink.pass_by();
+            self.sink.skip_frame();
             return Ok(ControlFlow::Continue(false));
         };
         Ok(flow.map_continue(|()| true))
@@ -185,8 +185,8 @@ impl<'a> Stage<'a> {
 
     /// Receives the next frame; `Nothing` if the sink must repeat its last picture first.
     fn receive_next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
-        match self.sink.hold() {
-            Some(hold) => from.recv_timeout(hold),
+        match self.sink.repeat_interval() {
+            Some(interval) => from.recv_timeout(interval),
             None => from.recv().map_or(Received::Ended, Received::Item),
         }
     }

@@ -89,8 +89,8 @@ pub struct Run<'a> {
     /// Where blurred pictures are wanted; `None` is in memory, and a mirrored picture always is. The sink only receives
     /// pictures in memory.
     pub output_request: Option<Arc<OutputRequest>>,
-    /// Receives each frame that the sink took, with its inputs; the newest wins. If the sink [keeps](Sink::keeps)
-    /// nothing, a frame counts as delivered once it was received here.
+    /// Receives each frame that the sink took, with its inputs; the newest wins. If the sink has [no outputs](Sink::has_outputs),
+    /// a frame counts as delivered once it was received here.
     pub view: Option<Sender<View>>,
     /// The clock.
     pub clock: Clock,

@@ -103,13 +103,13 @@ pub enum SinkError {
     )]
     NoFfmpeg { path: PathBuf },
     /// The ffmpeg program failed.
-    #[error("ffmpeg could not write {} ({status}): {}", path.display(), if said.is_empty() { "it gave no \
-                                                                                              reason" } else { said })]
+    #[error("ffmpeg could not write {} ({status}): {}", path.display(), if stderr.is_empty() { "it gave no \
+                                                                                              reason" } else { stderr })]
     Ffmpeg {
         path: PathBuf,
         status: String,
         /// Its last lines, joined by ` | `.
-        said: String,
+        stderr: String,
     },
     /// A window where none can be opened.
     #[error("{}", if cfg!(feature = "window") { NO_WINDOW } else { NOT_BUILT })]

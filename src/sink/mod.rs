@@ -17,12 +17,12 @@ mod pipe;
 mod pipewire;
 mod png;
 mod rate;
+mod rate_converter;
 pub mod raw;
 mod shutter;
-mod steady;
-pub mod switch;
 mod target;
 mod tee;
+pub mod tee_control;
 mod y4m;
 pub mod yuv;
 #[doc(hidden)]
@@ -39,14 +39,14 @@ pub use error::SinkError;
 pub use ffmpeg::Ffmpeg;
 #[cfg(feature = "camera")]
 pub use loopback::Loopback;
-pub use output::recover_all;
+pub use output::recover_videos;
 pub use output_thread::Backpressure;
 pub use pipe::Pipe;
 pub use png::PngFolder;
 pub use shutter::{CardNotShown, Shutter, ShutterControl};
-pub use switch::Switchboard;
 pub use target::Target;
 pub use tee::Tee;
+pub use tee_control::TeeControl;
 pub use y4m::{Y4m, Y4mFile};
 
 use crate::frame::{ColorImage, YuyvImage};
@@ -57,9 +57,9 @@ use crate::stats::{NodeUse, OutputUse};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// It has, as far as the number of frames is known.
-    Whole,
+    Complete,
     /// A fault or an interrupt ended the run before its own end.
-    Cut,
+    Truncated,
 }
 
 /// Receives finished frames, in order.
@@ -72,42 +72,42 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// The frame could not be written. A file then accepts no more; its content is kept, and the error says where.
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
 
-    /// Whether pictures should come through [`Sink::put_yuyv`] from now on, where that is cheap. Pictures in flight
+    /// Whether pictures should come through [`Sink::write_yuyv`] from now on, where that is cheap. Pictures in flight
     /// still arrive in the earlier form, so a sink that has once returned true must accept both from then on.
     fn wants_yuyv(&mut self) -> bool {
         false
     }
 
-    /// Writes a picture that is YUYV already, for sinks that [want](Sink::wants_yuyv) it, like [`Sink::put`]. May swap
+    /// Writes a picture that is YUYV already, for sinks that [want](Sink::wants_yuyv) it, like [`Sink::write_frame`]. May swap
     /// the picture's memory for another buffer.
     ///
     /// # Errors
-    /// Those of [`Sink::put`]; the sink never wanted YUYV.
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    /// Those of [`Sink::write_frame`]; the sink never wanted YUYV.
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let _ = (frame, time_ns);
         Err(SinkError::Yuyv)
     }
 
-    /// Sets the capture time, by the clock of the run, of the frame in the next [`Sink::put`] or [`Sink::put_yuyv`]:
+    /// Sets the capture time, by the clock of the run, of the frame in the next [`Sink::write_frame`] or [`Sink::write_yuyv`]:
     /// for outputs that pass it on.
-    fn captured(&mut self, captured_ns: u64) {
+    fn set_capture_time(&mut self, captured_ns: u64) {
         let _ = captured_ns;
     }
 
-    /// Longest time that a live output may go without a picture; whenever it has passed, [`Sink::repeat`] is called.
+    /// Longest time that a live output may go without a picture; whenever it has passed, [`Sink::repeat_frame`] is called.
     /// `None` for outputs that store frames.
-    fn hold(&self) -> Option<Duration> {
+    fn repeat_interval(&self) -> Option<Duration> {
         None
     }
 
     /// Shows the last picture again; a still card before the first one, and while no client watches. `Continue` holds
-    /// whether anything was shown; `Break` is as for [`Sink::put`].
+    /// whether anything was shown; `Break` is as for [`Sink::write_frame`].
     ///
     /// # Errors
     /// The picture could not be written.
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         Ok(ControlFlow::Continue(false))
     }
 
@@ -115,17 +115,17 @@ pub trait Sink: Send {
     /// it, at frame times, until the next picture.
     ///
     /// # Errors
-    /// Those of [`Sink::put`].
-    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.put(card, time_ns)
+    /// Those of [`Sink::write_frame`].
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.write_frame(card, time_ns)
     }
 
-    /// Called instead of [`Sink::put`] for a frame that is not in CPU memory: only a preview gets it.
-    fn pass_by(&mut self) {}
+    /// Called instead of [`Sink::write_frame`] for a frame that is not in CPU memory: only a preview gets it.
+    fn skip_frame(&mut self) {}
 
     /// Whether frames currently reach an output. While they do not, a frame counts as delivered once a preview shows
     /// it.
-    fn keeps(&self) -> bool {
+    fn has_outputs(&self) -> bool {
         true
     }
 
@@ -134,18 +134,18 @@ pub trait Sink: Send {
         false
     }
 
-    /// Lists outputs that [`Sink::cover`] has sent the card, and that have not shown it yet.
-    fn uncovered(&self) -> Vec<Uncovered> {
+    /// Lists outputs that [`Sink::write_card`] has sent the card, and that have not shown it yet.
+    fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
         Vec::new()
     }
 
     /// Returns the counters of frames sent to PipeWire cameras.
-    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
         Vec::new()
     }
 
     /// Returns the counters of outputs that get their frames asynchronously.
-    fn outputs(&self) -> Vec<Counter<OutputUse>> {
+    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
         Vec::new()
     }
 
@@ -169,13 +169,13 @@ pub trait Sink: Send {
 pub type Counter<T> = Arc<dyn Fn() -> T + Send + Sync>;
 
 /// Reads all counters.
-pub(crate) fn read<T>(counters: &[Counter<T>]) -> Vec<T> {
+pub(crate) fn read_counters<T>(counters: &[Counter<T>]) -> Vec<T> {
     counters.iter().map(|count| count()).collect()
 }
 
 /// An output that may still show a picture instead of the card.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Uncovered {
+pub struct OutputWithoutCard {
     /// Description of the output.
     pub output: String,
     /// Whether its pictures are seen as they come.
@@ -186,7 +186,7 @@ pub struct Uncovered {
 pub struct Null;
 
 impl Sink for Null {
-    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         Ok(ControlFlow::Continue(()))
     }
 

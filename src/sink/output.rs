@@ -11,7 +11,7 @@ use crate::files::whole::{self, Part};
 /// A file under construction that holds frames. A file with frames is never removed: if it cannot get its name, it is
 /// kept as `NAME.incomplete`.
 #[derive(Debug)]
-pub(super) struct Output {
+pub(super) struct OutputFile {
     path: PathBuf,
     force: bool,
     /// `None` once it has ended.
@@ -20,7 +20,7 @@ pub(super) struct Output {
     pub frames: u64,
 }
 
-impl Output {
+impl OutputFile {
     /// Prepares to write `path`, creating missing parent folders. Unfinished files of a killed run are kept, which is
     /// logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
@@ -33,7 +33,7 @@ impl Output {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             fs::create_dir_all(folder).map_err(SinkError::write(folder))?;
         }
-        for kept in recover(path)? {
+        for kept in keep_leftovers(path)? {
             tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
         }
         let part = Part::create(path).map_err(SinkError::write(path))?;
@@ -51,7 +51,7 @@ impl Output {
     }
 
     /// The temporary name.
-    pub(super) fn part(&self) -> &Path {
+    pub(super) fn part_path(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, Part::part)
     }
 
@@ -68,7 +68,7 @@ impl Output {
     }
 
     /// Continues with a file that has the same frames in a better form.
-    pub(super) fn replace(&mut self, part: Part) {
+    pub(super) fn replace_part(&mut self, part: Part) {
         // Dropping the old part removes it.
         self.part = Some(part);
     }
@@ -80,12 +80,12 @@ impl Output {
         if let Err(error) = exists {
             return Err(self.keep_if_frames(part, error));
         }
-        let replace = self.force && ending == Ending::Whole;
+        let replace = self.force && ending == Ending::Complete;
         let Err(cause) = part.try_commit(replace) else { return Ok(()) };
         let is_name_taken = cause.kind() == ErrorKind::AlreadyExists;
         // Only a truncated recording gets here with `force`; keeping the old file is not an error.
         if is_name_taken && self.force {
-            let (kept, path) = (keep(part), self.path.display());
+            let (kept, path) = (keep_part(part), self.path.display());
             tracing::warn!("{path} is unchanged: the new file is incomplete, and {kept}");
             return Ok(());
         }
@@ -122,18 +122,18 @@ impl Output {
     }
 }
 
-impl Drop for Output {
+impl Drop for OutputFile {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
             // Done before the log call, whose arguments are not evaluated if the level is disabled.
-            let kept = keep(part);
+            let kept = keep_part(part);
             tracing::warn!("{}: the incomplete file {kept}", self.path.display());
         }
     }
 }
 
 /// Keeps the part, and returns where as text for a message.
-fn keep(part: Part) -> String {
+fn keep_part(part: Part) -> String {
     match part.keep_incomplete() {
         Ok(kept) => format!("is kept as {}", kept.display()),
         Err(cause) => format!("is lost: {cause}"),
@@ -141,15 +141,15 @@ fn keep(part: Part) -> String {
 }
 
 /// Keeps the files that killed runs left of `path`; returns the new names.
-fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
+fn keep_leftovers(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
     // A folder may be writable without being readable.
     let abandoned = whole::left_behind(path).unwrap_or_default();
-    let kept = abandoned.into_iter().map(|part| keep_or_remove(&part, path));
+    let kept = abandoned.into_iter().map(|part| keep_or_remove_part(&part, path));
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }
 
 /// Renames an abandoned part to `path` with `.incomplete` in the name, and returns that name; removes an empty one.
-fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
+fn keep_or_remove_part(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     let done = match part.metadata().map(|part| part.len()) {
         Ok(0) => fs::remove_file(part).map(|()| None),
         Ok(_) => whole::keep_incomplete(part, path).map(Some),
@@ -164,8 +164,8 @@ fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
 
 /// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; returns the new names.
 /// Ignores videos whose `NAME` does not satisfy `is_ours`, and those that cannot be renamed.
-pub fn recover_all(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+pub fn recover_videos(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let abandoned = whole::all_left_behind(folder).unwrap_or_default().into_iter();
     let ours = abandoned.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
-    ours.filter_map(|(part, name)| keep_or_remove(&part, &folder.join(name)).ok().flatten()).collect()
+    ours.filter_map(|(part, name)| keep_or_remove_part(&part, &folder.join(name)).ok().flatten()).collect()
 }

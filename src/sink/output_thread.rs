@@ -9,13 +9,13 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{io, mem};
 
-use super::{Counter, Ending, Sink, SinkError, Uncovered};
+use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::frame::ColorImage;
 use crate::link::{self, Abandoned, Received, Sender, Sent};
 use crate::stats::{NodeUse, OutputUse};
 
 /// An output that takes longer than this to complete is reported to the user, who waits for it.
-const LONG_WAIT: Duration = Duration::from_secs(3);
+const WAIT_NOTICE_DELAY: Duration = Duration::from_secs(3);
 
 /// A sink on a thread of its own, and the link that delivers its pictures.
 pub(super) struct OutputThread {
@@ -27,7 +27,7 @@ pub(super) struct OutputThread {
     shared: Arc<Shared>,
     outcome: Receiver<Outcome>,
     thread: Option<JoinHandle<()>>,
-    nodes: Vec<Counter<NodeUse>>,
+    node_counters: Vec<Counter<NodeUse>>,
 }
 
 /// A picture shared by several outputs.
@@ -92,13 +92,13 @@ impl OutputThread {
         on_end: impl FnOnce(u64, &Outcome) + Send + 'static,
     ) -> io::Result<Self> {
         let (sender, receiver) = if backpressure == Backpressure::DropOldest { link::live() } else { link::lossless() };
-        let (name, is_live, nodes) = (sink.describe(), sink.is_live(), sink.nodes());
+        let (name, is_live, node_counters) = (sink.describe(), sink.is_live(), sink.node_counters());
         let (shared, sink_name) = (Arc::<Shared>::default(), name.clone());
         let (outcome_sender, outcome) = mpsc::channel();
         let thread_shared = Arc::clone(&shared);
-        let serve = move || {
+        let run = move || {
             // A panic is an error of this output only.
-            let ended = catch_unwind(AssertUnwindSafe(|| serve(sink, receiver, &thread_shared)));
+            let ended = catch_unwind(AssertUnwindSafe(|| serve_sink(sink, receiver, &thread_shared)));
             let outcome = ended.unwrap_or_else(|panic| {
                 let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
                 Outcome::Failed(SinkError::Panic { sink: sink_name, what: text.unwrap_or("no reason given").into() })
@@ -107,8 +107,8 @@ impl OutputThread {
             // The receiver may be gone.
             let _ = outcome_sender.send(outcome);
         };
-        let thread = Some(thread::Builder::new().name("output".into()).spawn(serve)?);
-        Ok(Self { name, is_live, sender: Some(sender), shared, outcome, thread, nodes })
+        let thread = Some(thread::Builder::new().name("output".into()).spawn(run)?);
+        Ok(Self { name, is_live, sender: Some(sender), shared, outcome, thread, node_counters })
     }
 
     /// Sends a picture. Returns it if a blocking output had no space within `timeout`.
@@ -139,9 +139,9 @@ impl OutputThread {
     }
 
     /// Returns this output, if it may still show a picture instead of the card.
-    pub fn uncovered(&self) -> Option<Uncovered> {
-        let is_covered = self.shared.shows_card.load(Ordering::Acquire);
-        (!is_covered).then(|| Uncovered { output: self.name.clone(), is_live: self.is_live })
+    pub fn without_card(&self) -> Option<OutputWithoutCard> {
+        let shows_card = self.shared.shows_card.load(Ordering::Acquire);
+        (!shows_card).then(|| OutputWithoutCard { output: self.name.clone(), is_live: self.is_live })
     }
 
     /// Whether its thread has ended.
@@ -151,7 +151,7 @@ impl OutputThread {
     }
 
     /// Returns how it ended, if it has.
-    pub fn outcome(&mut self) -> Option<Outcome> {
+    pub fn try_outcome(&mut self) -> Option<Outcome> {
         match self.outcome.try_recv() {
             Ok(outcome) => Some(outcome),
             Err(TryRecvError::Empty) => None,
@@ -168,7 +168,7 @@ impl OutputThread {
     /// Waits until it has ended; logs a long wait.
     pub fn join(mut self) -> Outcome {
         self.sender = None;
-        let outcome = match self.outcome.recv_timeout(LONG_WAIT) {
+        let outcome = match self.outcome.recv_timeout(WAIT_NOTICE_DELAY) {
             Err(RecvTimeoutError::Timeout) => {
                 tracing::warn!("{}: waiting until it is complete; press Ctrl-C again to give up", self.name);
                 self.outcome.recv().ok()
@@ -179,7 +179,7 @@ impl OutputThread {
     }
 
     /// Creates a counter of its frames, which stays valid after its end.
-    pub fn counter(&self) -> Counter<OutputUse> {
+    pub fn create_counter(&self) -> Counter<OutputUse> {
         let (output, shared) = (self.name.clone(), Arc::clone(&self.shared));
         Arc::new(move || OutputUse {
             output: output.clone(),
@@ -189,8 +189,8 @@ impl OutputThread {
         })
     }
 
-    pub fn nodes(&self) -> &[Counter<NodeUse>] {
-        &self.nodes
+    pub fn node_counters(&self) -> &[Counter<NodeUse>] {
+        &self.node_counters
     }
 }
 
@@ -204,15 +204,15 @@ impl Drop for OutputThread {
 }
 
 /// Passes pictures to a sink until no more come, and completes it.
-fn serve(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, shared: &Shared) -> Outcome {
+fn serve_sink(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, shared: &Shared) -> Outcome {
     loop {
-        let received = match sink.hold() {
-            Some(hold) => receiver.recv_timeout(hold),
+        let received = match sink.repeat_interval() {
+            Some(interval) => receiver.recv_timeout(interval),
             None => receiver.recv().map_or(Received::Ended, Received::Item),
         };
         let flow = match received {
-            Received::Item(picture) => put_picture(&mut *sink, &picture, shared),
-            Received::Nothing => sink.repeat().map(|flow| {
+            Received::Item(picture) => write_picture(&mut *sink, &picture, shared),
+            Received::Nothing => sink.repeat_frame().map(|flow| {
                 let repeats = u64::from(flow == ControlFlow::Continue(true));
                 shared.repeats.fetch_add(repeats, Ordering::Relaxed);
                 flow.map_continue(|_| ())
@@ -223,7 +223,7 @@ fn serve(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, sh
             Ok(ControlFlow::Continue(())) => {}
             Ok(ControlFlow::Break(())) => {
                 drop(receiver);
-                return Outcome::Ended(sink.finish(Ending::Whole));
+                return Outcome::Ended(sink.finish(Ending::Complete));
             }
             // Not finished: a sink that fails has kept its output itself.
             Err(error) => return Outcome::Failed(error),
@@ -235,10 +235,10 @@ fn serve(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, sh
     }
 }
 
-fn put_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
+fn write_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
     let Picture { image, time_ns, captured_ns, is_card } = picture;
-    sink.captured(*captured_ns);
-    let flow = if *is_card { sink.cover(image, *time_ns)? } else { sink.put(image, *time_ns)? };
+    sink.set_capture_time(*captured_ns);
+    let flow = if *is_card { sink.write_card(image, *time_ns)? } else { sink.write_frame(image, *time_ns)? };
     if flow.is_continue() {
         shared.frames.fetch_add(1, Ordering::Relaxed);
         // ShutterControl: a reader that sees the card here also sees that the sink has received it.
@@ -249,24 +249,24 @@ fn put_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Resul
 
 /// A pool of pictures, sized by the number that the outputs hold at a time; each is copied once for all outputs.
 #[derive(Default)]
-pub(super) struct Pictures {
-    all: Vec<Arc<Picture>>,
+pub(super) struct PicturePool {
+    pictures: Vec<Arc<Picture>>,
 }
 
-impl Pictures {
+impl PicturePool {
     /// Copies `frame` to a picture that outputs can share. Reuses a picture that no output holds any more, if there is
     /// one.
     pub fn copy_frame(&mut self, frame: &ColorImage, time_ns: u64, captured_ns: u64, is_card: bool) -> Arc<Picture> {
-        let free = self.all.iter_mut().position(|picture| Arc::get_mut(picture).is_some());
+        let free = self.pictures.iter_mut().position(|picture| Arc::get_mut(picture).is_some());
         let at = free.unwrap_or_else(|| {
-            self.all.push(Arc::new(Picture { image: ColorImage::default(), time_ns, captured_ns, is_card }));
-            self.all.len() - 1
+            self.pictures.push(Arc::new(Picture { image: ColorImage::default(), time_ns, captured_ns, is_card }));
+            self.pictures.len() - 1
         });
-        if let Some(picture) = Arc::get_mut(&mut self.all[at]) {
+        if let Some(picture) = Arc::get_mut(&mut self.pictures[at]) {
             let mut image = mem::take(&mut picture.image);
             image.copy_from(frame);
             *picture = Picture { image, time_ns, captured_ns, is_card };
         }
-        Arc::clone(&self.all[at])
+        Arc::clone(&self.pictures[at])
     }
 }

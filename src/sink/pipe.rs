@@ -17,7 +17,7 @@ pub(super) const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// How often a blocked writer checks whether to continue waiting.
 const TICK: Duration = Duration::from_millis(50);
 /// Minimum free space of a pipe when `poll` reports it as writable (`PIPE_BUF`): writing this much does not block.
-const ROOM_BYTES: usize = 4096;
+const MIN_FREE_BYTES: usize = 4096;
 
 /// A writer with a bounded wait for free space; then writing fails with [`ErrorKind::TimedOut`].
 pub struct Pipe {
@@ -25,7 +25,7 @@ pub struct Pipe {
     /// Maximum bytes of one `write` call; `None` for a file, which is written without polling.
     chunk_bytes: Option<usize>,
     /// Whether to continue waiting, after nothing was written for the given time.
-    keep_waiting: Box<dyn FnMut(Duration) -> bool + Send>,
+    should_wait: Box<dyn FnMut(Duration) -> bool + Send>,
 }
 
 impl Pipe {
@@ -34,19 +34,19 @@ impl Pipe {
         let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         let kind = file.metadata()?.file_type();
         // Not made non-blocking, since it may be shared with other processes: small writes do not block either.
-        let chunk_bytes = (kind.is_fifo() || kind.is_socket() || kind.is_char_device()).then_some(ROOM_BYTES);
+        let chunk_bytes = (kind.is_fifo() || kind.is_socket() || kind.is_char_device()).then_some(MIN_FREE_BYTES);
         let stop = Arc::clone(stop);
-        let keep_waiting = move |blocked: Duration| !stop.load(Ordering::Relaxed) || blocked < STOP_TIMEOUT;
-        Ok(Self { file, chunk_bytes, keep_waiting: Box::new(keep_waiting) })
+        let should_wait = move |blocked: Duration| !stop.load(Ordering::Relaxed) || blocked < STOP_TIMEOUT;
+        Ok(Self { file, chunk_bytes, should_wait: Box::new(should_wait) })
     }
 
     /// Wraps the end of a pipe that only this program uses, and makes it non-blocking.
     pub(super) fn from_owned(
         end: OwnedFd,
-        keep_waiting: impl FnMut(Duration) -> bool + Send + 'static,
+        should_wait: impl FnMut(Duration) -> bool + Send + 'static,
     ) -> io::Result<Self> {
         fcntl_setfl(&end, fcntl_getfl(&end)? | OFlags::NONBLOCK)?;
-        Ok(Self { file: File::from(end), chunk_bytes: Some(usize::MAX), keep_waiting: Box::new(keep_waiting) })
+        Ok(Self { file: File::from(end), chunk_bytes: Some(usize::MAX), should_wait: Box::new(should_wait) })
     }
 
     /// Waits until the reader has read everything written, or has gone, for at most `timeout`. Errors are reported by
@@ -71,13 +71,13 @@ impl Write for Pipe {
         let Some(chunk_bytes) = self.chunk_bytes else { return self.file.write(bytes) };
         let started = Instant::now();
         loop {
-            if wait_for_room(&self.file)? {
+            if wait_writable(&self.file)? {
                 match self.file.write(&bytes[..bytes.len().min(chunk_bytes)]) {
                     Err(error) if error.kind() == ErrorKind::WouldBlock => {}
                     written => return written,
                 }
             }
-            if !(self.keep_waiting)(started.elapsed()) {
+            if !(self.should_wait)(started.elapsed()) {
                 return Err(ErrorKind::TimedOut.into());
             }
         }
@@ -89,7 +89,7 @@ impl Write for Pipe {
 }
 
 /// Waits up to [`TICK`] for free space; returns whether there is any.
-fn wait_for_room(file: &File) -> io::Result<bool> {
+fn wait_writable(file: &File) -> io::Result<bool> {
     let mut ends = [PollFd::new(file, PollFlags::OUT)];
     let tick = Timespec { tv_sec: 0, tv_nsec: TICK.as_nanos() as i64 };
     match poll(&mut ends, Some(&tick)) {
@@ -110,11 +110,11 @@ mod tests {
     fn a_reader_that_takes_nothing_is_left_when_nobody_waits_any_more() {
         let (mut reader, writer) = io::pipe().unwrap();
         let mut asked = 0;
-        let keep_waiting = move |_| {
+        let should_wait = move |_| {
             asked += 1;
             asked < 3
         };
-        let mut pipe = Pipe::from_owned(writer.into(), keep_waiting).unwrap();
+        let mut pipe = Pipe::from_owned(writer.into(), should_wait).unwrap();
         let bytes = vec![7; 1 << 20];
         assert_eq!(pipe.write_all(&bytes).unwrap_err().kind(), ErrorKind::TimedOut);
         // The bytes written before the timeout are there.

@@ -27,12 +27,12 @@ use crate::pipewire::node::{DrawnPicture, Node, PictureMemory, PictureSource, Se
 use crate::stats::NodeUse;
 
 /// Default name of a camera.
-const NAME: &str = "bokehcam";
+const DEFAULT_NAME: &str = "bokehcam";
 /// Shortest and longest time after which the last picture is repeated for readers.
-const HOLD: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
+const REPEAT_INTERVAL: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
 /// Maximum number of pictures in flight: one being made, one waiting, and two with the node, which receives the next
 /// one before it releases the last.
-const PICTURES: usize = 4;
+const MAX_IN_FLIGHT: usize = 4;
 
 /// A camera provided to PipeWire.
 pub struct PipeWire {
@@ -70,8 +70,9 @@ impl PipeWire {
     /// # Errors
     /// PipeWire cannot be reached, or refuses.
     pub fn open(label: Option<&str>, options: &Options) -> Result<Self, SinkError> {
-        let label = label.unwrap_or(NAME);
-        let camera = Self::new(label, (node_name(label), None), |best| vec![best.to_mode()], options)?;
+        let label = label.unwrap_or(DEFAULT_NAME);
+        let camera =
+            Self::new(label, (node_name(label), None), |default_format| vec![default_format.to_mode()], options)?;
         let (width, height) = camera.encoder.format().size();
         let description = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
         Ok(Self { description, ..camera })
@@ -82,7 +83,7 @@ impl PipeWire {
     ///
     /// # Errors
     /// Those of [`PipeWire::open`]; the camera does not exist, or the session manager does not support filters.
-    pub fn filter(options: &Options) -> Result<Self, SinkError> {
+    pub fn open_filter(options: &Options) -> Result<Self, SinkError> {
         let camera_name = options.filter_target.as_deref().ok_or(SinkError::Filter)?;
         let camera = Graph::find_filter_target(camera_name)?;
         let modes = writable_modes(&camera.modes);
@@ -91,7 +92,7 @@ impl PipeWire {
             return Err(PipeWireError::NoMode { name: camera.name, why }.into());
         }
         let label = format!("{}, blurred", camera.label);
-        let name = (format!("{NAME}.{}", camera.name), Some(camera.name.clone()));
+        let name = (format!("{DEFAULT_NAME}.{}", camera.name), Some(camera.name.clone()));
         let filter = Self::new(&label, name, |_| modes, options)?;
         let description = format!("all readers of pipewire:{} ({})", camera.name, camera.label);
         Ok(Self { description, ..filter })
@@ -110,32 +111,32 @@ impl PipeWire {
         let size = ((width & !1).max(2), (height & !1).max(2));
         let (rate, scale) = frame_rate(options.period_ns);
         let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
-        let best = NegotiatedFormat { fourcc: *b"YUYV", size, rate: (saturated(rate), saturated(scale)) };
+        let default_format = NegotiatedFormat { fourcc: *b"YUYV", size, rate: (saturated(rate), saturated(scale)) };
         let settings = Settings {
             name,
             label: label.to_owned(),
-            modes: modes(&best),
-            best,
+            modes: modes(&default_format),
+            best: default_format,
             filter_target,
-            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(HOLD.0, HOLD.1),
+            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(REPEAT_INTERVAL.0, REPEAT_INTERVAL.1),
         };
         let (sender, receiver) = link::live();
         let (is_watched, format) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::default()));
-        let mut screen = Screen {
+        let mut node_pictures = NodePictures {
             receiver,
             frame: None,
             is_new: false,
-            card: Picture { format: Format::from(&best), bytes: Vec::new() },
+            card: Picture { format: Format::from(&default_format), bytes: Vec::new() },
             format: Arc::clone(&format),
             demand: options.demand.clone(),
             watch: None,
             is_watched: Arc::clone(&is_watched),
         };
-        screen.set_format(&best);
-        let encoder = Encoder::new(Format::from(&best)).ok_or(SinkError::Yuyv)?;
-        let (first, bytes) = (encoder.format(), encoder.memory().bytes);
-        let node = Node::new(settings, screen)?;
-        let pictures = Pool::new(PICTURES, || Picture { format: first, bytes: vec![0; bytes] });
+        node_pictures.set_format(&default_format);
+        let encoder = Encoder::new(Format::from(&default_format)).ok_or(SinkError::Yuyv)?;
+        let (first, bytes) = (encoder.format(), encoder.picture_memory().bytes);
+        let node = Node::new(settings, node_pictures)?;
+        let pictures = Pool::new(MAX_IN_FLIGHT, || Picture { format: first, bytes: vec![0; bytes] });
         let description = String::new();
         Ok(Self {
             node,
@@ -151,11 +152,11 @@ impl PipeWire {
     }
 
     fn negotiated_format(&self) -> Format {
-        Format::unpacked(self.format.load(Ordering::Relaxed))
+        Format::unpack(self.format.load(Ordering::Relaxed))
     }
 }
 
-fn count(counter: &AtomicU64, pictures: u64) {
+fn add_count(counter: &AtomicU64, pictures: u64) {
     counter.fetch_add(pictures, Ordering::Relaxed);
 }
 
@@ -163,23 +164,23 @@ fn count(counter: &AtomicU64, pictures: u64) {
 fn node_name(label: &str) -> String {
     let words = label.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     let name = words.map(str::to_lowercase).collect::<Vec<_>>().join("-");
-    if name.is_empty() { NAME.to_owned() } else { name }
+    if name.is_empty() { DEFAULT_NAME.to_owned() } else { name }
 }
 
 impl PipeWire {
     /// Sends the node a picture, which `make` creates only if the camera is watched.
-    fn send(&mut self, make: impl FnOnce(&mut Self, &mut Picture)) -> ControlFlow<()> {
+    fn send_picture(&mut self, make: impl FnOnce(&mut Self, &mut Picture)) -> ControlFlow<()> {
         if !self.is_watched.load(Ordering::Relaxed) {
-            count(&self.node.counts().unwatched, 1);
+            add_count(&self.node.counts().unwatched, 1);
             return ControlFlow::Continue(());
         }
         let Some(mut picture) = self.pictures.try_take() else {
-            count(&self.node.counts().overtaken, 1);
+            add_count(&self.node.counts().overtaken, 1);
             return ControlFlow::Continue(());
         };
         make(self, &mut picture);
         match self.sender.send(Frame { picture, captured_ns: self.captured_ns }) {
-            Ok(overtaken) => count(&self.node.counts().overtaken, overtaken.is_some().into()),
+            Ok(overtaken) => add_count(&self.node.counts().overtaken, overtaken.is_some().into()),
             // The node's thread has panicked, which was printed.
             Err(link::Abandoned) => return ControlFlow::Break(()),
         }
@@ -189,18 +190,18 @@ impl PipeWire {
 }
 
 impl Sink for PipeWire {
-    fn captured(&mut self, captured_ns: u64) {
+    fn set_capture_time(&mut self, captured_ns: u64) {
         self.captured_ns = captured_ns;
     }
 
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let format = self.negotiated_format();
         if self.encoder.format() != format
             && let Some(encoder) = Encoder::new(format)
         {
             self.encoder = encoder;
         }
-        Ok(self.send(|camera, picture| {
+        Ok(self.send_picture(|camera, picture| {
             picture.format = camera.encoder.format();
             camera.encoder.encode(frame, &mut picture.bytes);
         }))
@@ -210,9 +211,9 @@ impl Sink for PipeWire {
         self.negotiated_format().is_yuyv(self.size)
     }
 
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
-        Ok(self.send(|camera, picture| {
+        Ok(self.send_picture(|camera, picture| {
             // A format negotiated meanwhile applies from the next picture on.
             picture.format = Format::yuyv(camera.size);
             std::mem::swap(&mut picture.bytes, &mut frame.bytes);
@@ -223,7 +224,7 @@ impl Sink for PipeWire {
         true
     }
 
-    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
         let (node, counts) = (self.node.name().to_owned(), Arc::clone(self.node.counts()));
         let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         vec![Arc::new(move || NodeUse {
@@ -243,7 +244,7 @@ impl Sink for PipeWire {
 }
 
 /// The node's pictures, on its thread.
-struct Screen {
+struct NodePictures {
     receiver: Receiver<Frame>,
     /// The last picture, while a client watches.
     frame: Option<Frame>,
@@ -258,7 +259,7 @@ struct Screen {
     is_watched: Arc<AtomicBool>,
 }
 
-impl PictureSource for Screen {
+impl PictureSource for NodePictures {
     fn update(&mut self) -> bool {
         let Some(frame) = self.receiver.try_recv() else { return false };
         // A picture that arrives just after the last reader left is dropped.
@@ -267,19 +268,19 @@ impl PictureSource for Screen {
         true
     }
 
-    fn set_format(&mut self, agreed: &NegotiatedFormat) -> PictureMemory {
-        let Some(mut encoder) = Encoder::new(Format::from(agreed)) else { return PictureMemory::default() };
-        let mut card = ColorImage::new(agreed.size.0, agreed.size.1);
-        card::draw(&mut card);
+    fn set_format(&mut self, negotiated: &NegotiatedFormat) -> PictureMemory {
+        let Some(mut encoder) = Encoder::new(Format::from(negotiated)) else { return PictureMemory::default() };
+        let mut card = ColorImage::new(negotiated.size.0, negotiated.size.1);
+        card::draw_card(&mut card);
         self.card.format = encoder.format();
         encoder.encode(&card, &mut self.card.bytes);
-        self.format.store(encoder.format().packed(), Ordering::Relaxed);
-        encoder.memory()
+        self.format.store(encoder.format().pack(), Ordering::Relaxed);
+        encoder.picture_memory()
     }
 
     fn draw_picture(&mut self, bytes: &mut [u8]) -> DrawnPicture {
-        let agreed = self.card.format;
-        let fits = |frame: &&Frame| frame.picture.format == agreed && frame.picture.bytes.len() <= bytes.len();
+        let negotiated = self.card.format;
+        let fits = |frame: &&Frame| frame.picture.format == negotiated && frame.picture.bytes.len() <= bytes.len();
         let frame = self.frame.as_ref().filter(fits);
         let picture = frame.map_or(&self.card, |frame| &frame.picture);
         let used = picture.bytes.len().min(bytes.len());
@@ -307,6 +308,6 @@ mod tests {
         assert_eq!(node_name("bokehcam"), "bokehcam");
         assert_eq!(node_name(" Desk: left (2) "), "desk-left-2");
         assert_eq!(node_name("Büro"), "büro");
-        assert_eq!(node_name("!?"), NAME);
+        assert_eq!(node_name("!?"), DEFAULT_NAME);
     }
 }

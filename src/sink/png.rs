@@ -18,7 +18,7 @@ pub struct PngFolder {
     path: PathBuf,
     /// `None` once it has ended.
     folder: Option<Folder>,
-    next: u64,
+    next_number: u64,
 }
 
 impl PngFolder {
@@ -28,22 +28,23 @@ impl PngFolder {
     /// The folder is not empty and `force` is not set, contains another program's file with the name of an expected
     /// frame, or cannot be created.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
-        let has = |name: &str| number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
+        let has =
+            |name: &str| parse_number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
         let folder = Folder::open(path, options.force, &Set { subfolders: &[], has: &has })?;
-        Ok(Self { path: path.to_owned(), folder: Some(folder), next: 0 })
+        Ok(Self { path: path.to_owned(), folder: Some(folder), next_number: 0 })
     }
 
-    fn add(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
+    fn write_png(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
         let Some(folder) = &mut self.folder else { return Ok(()) };
-        let part = folder.begin(&file_name(self.next))?;
-        encode(frame, &part)?;
+        let part = folder.begin(&file_name(self.next_number))?;
+        encode_png(frame, &part)?;
         folder.put(part)?;
-        self.next += 1;
+        self.next_number += 1;
         Ok(())
     }
 }
 
-fn encode(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
+fn encode_png(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
     let mut buffered = BufWriter::with_capacity(1 << 16, part.file());
     PngEncoder::new_with_quality(&mut buffered, CompressionType::Fast, FilterType::Sub)
         .write_image(&frame.rgb, frame.width, frame.height, ExtendedColorType::Rgb8)
@@ -55,7 +56,7 @@ fn encode(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
 }
 
 /// Parses the number in a file name, if this sink would use that name.
-fn number(name: &str) -> Option<u64> {
+fn parse_number(name: &str) -> Option<u64> {
     let number = name.strip_suffix(".png")?.parse().ok()?;
     (name == file_name(number)).then_some(number)
 }
@@ -65,8 +66,8 @@ fn file_name(number: u64) -> String {
 }
 
 impl Sink for PngFolder {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        let Err(error) = self.add(frame) else { return Ok(ControlFlow::Continue(())) };
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        let Err(error) = self.write_png(frame) else { return Ok(ControlFlow::Continue(())) };
         // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
         let kept = self.folder.take().and_then(|folder| folder.cut().ok().flatten());
         Err(match kept {
@@ -79,11 +80,11 @@ impl Sink for PngFolder {
         let Some(folder) = self.folder.take() else { return Ok(()) };
         let path = self.path.display();
         match ending {
-            Ending::Whole => match folder.finish()? {
+            Ending::Complete => match folder.finish()? {
                 0 => {}
-                gone => tracing::warn!("{path}: {gone} files of an earlier run are replaced by {}", self.next),
+                gone => tracing::warn!("{path}: {gone} files of an earlier run are replaced by {}", self.next_number),
             },
-            Ending::Cut => {
+            Ending::Truncated => {
                 if let Some(kept) = folder.cut()? {
                     tracing::warn!(
                         "{path} is unchanged: the new files are incomplete, and are kept as {}",

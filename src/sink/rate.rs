@@ -14,13 +14,13 @@ pub(super) fn frame_rate(period_ns: u64) -> (u64, u64) {
     } else if is_near(ntsc / 1.001) {
         (ntsc as u64 * 1000, 1001)
     } else if per_second >= 1.0 {
-        reduce((per_second * 1000.0).round() as u64, 1000)
+        reduce_fraction((per_second * 1000.0).round() as u64, 1000)
     } else {
-        reduce(1000, period_ns / 1_000_000)
+        reduce_fraction(1000, period_ns / 1_000_000)
     }
 }
 
-fn reduce(rate: u64, scale: u64) -> (u64, u64) {
+fn reduce_fraction(rate: u64, scale: u64) -> (u64, u64) {
     let (mut a, mut b) = (rate, scale);
     while b != 0 {
         (a, b) = (b, a % b);

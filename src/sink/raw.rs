@@ -47,12 +47,12 @@ impl Encoder {
     pub fn encode(&mut self, picture: &ColorImage, planes: &mut [&mut [u8]]) {
         let Self { arch, layout, converter, sums } = self;
         assert_eq!(picture.size(), (layout.width, layout.height), "an encoder is for pictures of one size");
-        arch.dispatch(Frame { layout, converter, sums, rgb: &picture.rgb, planes });
+        arch.dispatch(RawEncode { layout, converter, sums, rgb: &picture.rgb, planes });
     }
 }
 
 /// One picture to encode, compiled for each instruction set.
-struct Frame<'a, 'p> {
+struct RawEncode<'a, 'p> {
     layout: &'a Layout,
     converter: &'a Converter,
     sums: &'a mut [Vec<u16>; 3],
@@ -60,7 +60,7 @@ struct Frame<'a, 'p> {
     planes: &'a mut [&'p mut [u8]],
 }
 
-impl WithSimd for Frame<'_, '_> {
+impl WithSimd for RawEncode<'_, '_> {
     type Output = ();
 
     #[inline(always)]

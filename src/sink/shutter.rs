@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::time::{Duration, Instant};
 
-use super::{Counter, Ending, Sink, SinkError, Uncovered, card};
+use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError, card};
 use crate::clock::Clock;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
@@ -21,9 +21,9 @@ pub struct Shutter {
     closed: Arc<AtomicBool>,
     requests: Receiver<Request>,
     /// Receivers of a copy of the next picture.
-    copies: Vec<SyncSender<ColorImage>>,
+    copy_receivers: Vec<SyncSender<ColorImage>>,
     /// Receivers that wait until all outputs show the card, with their deadlines.
-    covers: Vec<(SyncSender<Vec<Uncovered>>, Instant)>,
+    card_waiters: Vec<(SyncSender<Vec<OutputWithoutCard>>, Instant)>,
     demand: Demand,
     /// Whether the demand is withheld.
     withheld: bool,
@@ -48,7 +48,7 @@ const TICK: Duration = Duration::from_millis(20);
 const IDLE_TICK: Duration = Duration::from_millis(100);
 
 /// Longest wait for outputs to show the card.
-const COVER_TIMEOUT: Duration = Duration::from_secs(1);
+const CARD_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Closes and opens a [`Shutter`], and copies pictures behind it, from any thread.
 #[derive(Clone)]
@@ -56,13 +56,13 @@ pub struct ShutterControl {
     closed: Arc<AtomicBool>,
     request_sender: Sender<Request>,
     /// The whole sink as one output.
-    whole_sink: Uncovered,
+    whole_sink: OutputWithoutCard,
 }
 
 /// Requests to a shutter, each with its reply channel. A requester that has timed out is ignored.
 enum Request {
-    Picture(SyncSender<ColorImage>),
-    Covered(SyncSender<Vec<Uncovered>>, Instant),
+    CopyPicture(SyncSender<ColorImage>),
+    WaitForCard(SyncSender<Vec<OutputWithoutCard>>, Instant),
 }
 
 /// These live outputs may still show a picture instead of the card.
@@ -82,13 +82,13 @@ impl Shutter {
         closed: Arc<AtomicBool>,
     ) -> (Self, ShutterControl) {
         let (request_sender, requests) = mpsc::channel();
-        let whole_sink = Uncovered { output: sink.describe(), is_live: sink.is_live() };
+        let whole_sink = OutputWithoutCard { output: sink.describe(), is_live: sink.is_live() };
         let shutter = Self {
             sink,
             closed: Arc::clone(&closed),
             requests,
-            copies: Vec::new(),
-            covers: Vec::new(),
+            copy_receivers: Vec::new(),
+            card_waiters: Vec::new(),
             demand,
             withheld: false,
             shows_card: false,
@@ -103,8 +103,8 @@ impl Shutter {
         (shutter, ShutterControl { closed, request_sender, whole_sink })
     }
 
-    /// Whether it is closed. Once the card is shown, the camera is released.
-    fn is_closed(&mut self) -> bool {
+    /// Withholds the demand once the card is shown, which releases the camera; returns whether it is closed.
+    fn update_demand(&mut self) -> bool {
         let closed = self.closed.load(Ordering::Acquire);
         let withheld = closed && self.shows_card;
         if withheld != self.withheld {
@@ -114,49 +114,49 @@ impl Shutter {
         closed
     }
 
-    /// Sends the sink a picture by `put`, or the card while it is closed.
+    /// Sends the sink a picture by `write`, or the card while it is closed.
     fn send_picture(
         &mut self,
         time_ns: u64,
-        put: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
+        write: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
     ) -> Result<ControlFlow<()>, SinkError> {
-        let closed = self.is_closed();
-        let time_ns = self.time_ns(time_ns);
+        let closed = self.update_demand();
+        let time_ns = self.to_sink_time_ns(time_ns);
         if closed {
             return self.send_card(time_ns);
         }
         self.record_sent(time_ns, false);
-        put(self, time_ns)
+        write(self, time_ns)
     }
 
     /// Handles pending requests; answers those that wait for the card once it is shown.
     fn handle_requests(&mut self) {
         for request in self.requests.try_iter() {
             match request {
-                Request::Picture(to) => self.copies.push(to),
-                Request::Covered(to, until) => self.covers.push((to, until)),
+                Request::CopyPicture(to) => self.copy_receivers.push(to),
+                Request::WaitForCard(to, until) => self.card_waiters.push((to, until)),
             }
         }
-        if self.covers.is_empty() {
+        if self.card_waiters.is_empty() {
             return;
         }
         // Once it was opened again there is nothing to wait for.
-        let is_given = self.shows_card || !self.closed.load(Ordering::Acquire);
-        let uncovered = if self.shows_card { self.sink.uncovered() } else { Vec::new() };
+        let is_settled = self.shows_card || !self.closed.load(Ordering::Acquire);
+        let without_card = if self.shows_card { self.sink.outputs_without_card() } else { Vec::new() };
         let now = Instant::now();
-        self.covers.retain(|(to, until)| {
-            let waits = !(is_given && uncovered.is_empty()) && now < *until;
-            if !waits {
-                let _ = to.try_send(uncovered.clone());
+        self.card_waiters.retain(|(to, until)| {
+            let is_waiting = !(is_settled && without_card.is_empty()) && now < *until;
+            if !is_waiting {
+                let _ = to.try_send(without_card.clone());
             }
-            waits
+            is_waiting
         });
     }
 
     /// Whether a copy of a picture is requested.
     fn is_copy_requested(&mut self) -> bool {
         self.handle_requests();
-        !self.copies.is_empty()
+        !self.copy_receivers.is_empty()
     }
 
     /// Sends the sink the card.
@@ -164,13 +164,13 @@ impl Shutter {
         self.record_sent(time_ns, true);
         let card = self.card.get_or_init(|| {
             let mut card = ColorImage::new(self.size.0, self.size.1);
-            card::draw(&mut card);
+            card::draw_card(&mut card);
             card
         });
-        let given = self.sink.cover(card, time_ns);
-        self.is_closed();
+        let sent = self.sink.write_card(card, time_ns);
+        self.update_demand();
         self.handle_requests();
-        given
+        sent
     }
 
     fn record_sent(&mut self, time_ns: u64, shows_card: bool) {
@@ -183,7 +183,7 @@ impl Shutter {
     }
 
     /// Converts the source's time to the sink's: later than the previous one.
-    fn time_ns(&mut self, time_ns: u64) -> u64 {
+    fn to_sink_time_ns(&mut self, time_ns: u64) -> u64 {
         let period_ns = self.period.as_nanos() as u64;
         match self.last_ns {
             Some(last_ns) if self.shows_card && time_ns + self.offset_ns <= last_ns => {
@@ -196,12 +196,12 @@ impl Shutter {
 }
 
 impl Sink for Shutter {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.send_picture(time_ns, |shutter, time_ns| {
             if shutter.is_copy_requested() {
-                shutter.copies.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
+                shutter.copy_receivers.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
             }
-            shutter.sink.put(frame, time_ns)
+            shutter.sink.write_frame(frame, time_ns)
         })
     }
 
@@ -210,44 +210,44 @@ impl Sink for Shutter {
         !self.is_copy_requested() && self.sink.wants_yuyv()
     }
 
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.send_picture(time_ns, |shutter, time_ns| shutter.sink.put_yuyv(frame, time_ns))
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.send_picture(time_ns, |shutter, time_ns| shutter.sink.write_yuyv(frame, time_ns))
     }
 
-    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.sink.cover(card, time_ns)
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.sink.write_card(card, time_ns)
     }
 
-    fn captured(&mut self, captured_ns: u64) {
-        self.sink.captured(captured_ns);
+    fn set_capture_time(&mut self, captured_ns: u64) {
+        self.sink.set_capture_time(captured_ns);
     }
 
     fn is_live(&self) -> bool {
         self.sink.is_live()
     }
 
-    fn uncovered(&self) -> Vec<Uncovered> {
-        self.sink.uncovered()
+    fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
+        self.sink.outputs_without_card()
     }
 
-    fn nodes(&self) -> Vec<Counter<NodeUse>> {
-        self.sink.nodes()
+    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
+        self.sink.node_counters()
     }
 
-    fn outputs(&self) -> Vec<Counter<OutputUse>> {
-        self.sink.outputs()
+    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
+        self.sink.output_counters()
     }
 
     /// Waits until the sink or the card is due, but at most a tick: it may be closed meanwhile.
-    fn hold(&self) -> Option<Duration> {
-        let due = if self.shows_card { Some(self.period) } else { self.sink.hold() };
+    fn repeat_interval(&self) -> Option<Duration> {
+        let due = if self.shows_card { Some(self.period) } else { self.sink.repeat_interval() };
         let is_idle = self.shows_card || !self.demand.is_watched();
-        let tick = if is_idle && self.covers.is_empty() { IDLE_TICK } else { TICK };
+        let tick = if is_idle && self.card_waiters.is_empty() { IDLE_TICK } else { TICK };
         Some(due.map_or(tick, |due| due.saturating_sub(self.time_since_sent()).min(tick)))
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        let (closed, time_since_sent) = (self.is_closed(), self.time_since_sent());
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        let (closed, time_since_sent) = (self.update_demand(), self.time_since_sent());
         self.handle_requests();
         if closed || self.shows_card && self.demand.is_watched() {
             if self.shows_card && time_since_sent < self.period {
@@ -256,22 +256,22 @@ impl Sink for Shutter {
             let time_ns = self.last_ns.map_or(0, |last_ns| last_ns + (time_since_sent.as_nanos() as u64).max(1));
             return Ok(self.send_card(time_ns)?.map_continue(|()| true));
         }
-        if self.sink.hold().is_none_or(|due| time_since_sent < due) {
+        if self.sink.repeat_interval().is_none_or(|due| time_since_sent < due) {
             return Ok(ControlFlow::Continue(false));
         }
         self.sent_ns = self.clock.now_ns();
-        self.sink.repeat()
+        self.sink.repeat_frame()
     }
 
-    fn pass_by(&mut self) {
+    fn skip_frame(&mut self) {
         // The sink gets nothing, so there is no card to wait for.
         self.shows_card = self.closed.load(Ordering::Acquire);
-        self.is_closed();
-        self.sink.pass_by();
+        self.update_demand();
+        self.sink.skip_frame();
     }
 
-    fn keeps(&self) -> bool {
-        self.sink.keeps()
+    fn has_outputs(&self) -> bool {
+        self.sink.has_outputs()
     }
 
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
@@ -295,9 +295,9 @@ impl ShutterControl {
     }
 
     /// Returns a copy of the next picture that passes; `None` if none does in time.
-    pub fn picture(&self, timeout: Duration) -> Option<ColorImage> {
+    pub fn copy_next_picture(&self, timeout: Duration) -> Option<ColorImage> {
         let (to, reply) = mpsc::sync_channel(1);
-        self.request_sender.send(Request::Picture(to)).ok()?;
+        self.request_sender.send(Request::CopyPicture(to)).ok()?;
         reply.recv_timeout(timeout).ok()
     }
 
@@ -306,18 +306,18 @@ impl ShutterControl {
     ///
     /// # Errors
     /// A live output may still show a picture.
-    pub fn wait_covered(&self) -> Result<Option<String>, CardNotShown> {
+    pub fn wait_for_card(&self) -> Result<Option<String>, CardNotShown> {
         let (to, reply) = mpsc::sync_channel(1);
         // A run that has ended shows nothing.
-        let sent = self.request_sender.send(Request::Covered(to, Instant::now() + COVER_TIMEOUT));
-        let uncovered = match sent.map(|()| reply.recv_timeout(2 * COVER_TIMEOUT)) {
-            Ok(Ok(uncovered)) => uncovered,
+        let sent = self.request_sender.send(Request::WaitForCard(to, Instant::now() + CARD_TIMEOUT));
+        let without_card = match sent.map(|()| reply.recv_timeout(2 * CARD_TIMEOUT)) {
+            Ok(Ok(without_card)) => without_card,
             // The thread that sends the pictures is blocked by one of the outputs.
             Ok(Err(RecvTimeoutError::Timeout)) => vec![self.whole_sink.clone()],
             Ok(Err(RecvTimeoutError::Disconnected)) | Err(_) => Vec::new(),
         };
         let names = |is_live: bool| {
-            let names = uncovered.iter().filter(|left| left.is_live == is_live).map(|left| left.output.as_str());
+            let names = without_card.iter().filter(|left| left.is_live == is_live).map(|left| left.output.as_str());
             names.collect::<Vec<_>>().join(", ")
         };
         match [names(true), names(false)] {

@@ -66,13 +66,13 @@ impl FromStr for Target {
             // An unknown name must not become a folder: a typo in the name of a camera would fill the disk.
             _ if path.is_dir() => Err(SinkError::NoSlash { name: name.into() }),
             _ if path.exists() => Err(SinkError::NoFolder { path }),
-            _ => Err(SinkError::Target { name: name.into(), near: suggest(name) }),
+            _ => Err(SinkError::Target { name: name.into(), near: suggest_sink(name) }),
         }
     }
 }
 
 /// Returns the sink that `name` may have been meant for.
-fn suggest(name: &str) -> Option<String> {
+fn suggest_sink(name: &str) -> Option<String> {
     if name.contains('/') && !name.starts_with("/dev/") {
         return None;
     }
@@ -124,7 +124,7 @@ impl Target {
             #[cfg(feature = "pipewire")]
             Self::PipeWire(label) => Box::new(PipeWire::open(label.as_deref(), options)?),
             #[cfg(feature = "pipewire")]
-            Self::Filter => Box::new(PipeWire::filter(options)?),
+            Self::Filter => Box::new(PipeWire::open_filter(options)?),
             #[cfg(not(feature = "pipewire"))]
             Self::PipeWire(_) | Self::Filter => return Err(SinkError::NoPipeWire),
             Self::Window => return Err(SinkError::Window),

@@ -7,37 +7,37 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use super::output_thread::{Backpressure, Outcome, OutputThread, Pictures};
-use super::switch::{Notice, Request, Switchboard};
-use super::{Counter, Ending, Sink, SinkError, Uncovered};
+use super::output_thread::{Backpressure, Outcome, OutputThread, PicturePool};
+use super::tee_control::{MemberEvent, Request, TeeControl};
+use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::frame::ColorImage;
 use crate::stats::{NodeUse, OutputUse};
 
 /// Sends every frame to each of its sinks, each on a thread of its own, so that in real time none waits for another.
 ///
 /// The sinks passed to [`Tee::new`] stay until their reader has gone: they are then completed and removed; once all
-/// are, [`Sink::put`] returns `Break`. A sink that fails is removed, too, which is logged, and its error is returned at
+/// are, [`Sink::write_frame`] returns `Break`. A sink that fails is removed, too, which is logged, and its error is returned at
 /// the end; the error of a live one is returned at once, which ends the run.
 ///
-/// The sinks that a [`Switchboard`] adds and removes are managed by its owner, who receives their outcomes; frames
+/// The sinks that a [`TeeControl`] adds and removes are managed by its owner, who receives their outcomes; frames
 /// continue without any sink. Recordings are always kept: without [`Sink::finish`], these sinks are completed on drop.
 pub struct Tee {
     name: String,
     /// The outputs, with the names under which they were added.
     outputs: Vec<(String, OutputThread)>,
     /// Removed outputs that are being completed.
-    ending: Vec<OutputThread>,
-    /// Requests of the switchboard, if there is one.
+    closing: Vec<OutputThread>,
+    /// Requests of the control, if there is one.
     requests: Option<Receiver<Request>>,
     backpressure: Backpressure,
     /// Whether pictures are blocked: then a full output is not waited for.
     closed: Arc<AtomicBool>,
-    pictures: Pictures,
+    picture_pool: PicturePool,
     captured_ns: u64,
     /// The first error of an output.
-    failed: Option<SinkError>,
-    frames: Vec<Counter<OutputUse>>,
-    nodes: Vec<Counter<NodeUse>>,
+    first_error: Option<SinkError>,
+    output_counters: Vec<Counter<OutputUse>>,
+    node_counters: Vec<Counter<NodeUse>>,
 }
 
 /// Period of checks for ended outputs, for requests, and for space where frames wait.
@@ -56,24 +56,24 @@ impl Tee {
     ) -> Result<Self, SinkError> {
         let start = |sink: Box<dyn Sink>| {
             // Live outputs never wait.
-            let own = if sink.is_live() { Backpressure::DropOldest } else { backpressure };
+            let policy = if sink.is_live() { Backpressure::DropOldest } else { backpressure };
             let name = sink.describe();
-            OutputThread::start(sink, own, |_, _| {}).map_err(|cause| SinkError::Thread { sink: name, cause })
+            OutputThread::start(sink, policy, |_, _| {}).map_err(|cause| SinkError::Thread { sink: name, cause })
         };
         let mut outputs = sinks.into_iter().map(start).collect::<Result<Vec<_>, _>>()?;
         let name = outputs.iter().map(|output| output.name.as_str()).collect::<Vec<_>>().join(", ");
         // Outputs that never wait come first.
         outputs.sort_by_key(|output| !output.is_live);
         let mut tee = Self::empty(name, backpressure, closed, None);
-        outputs.into_iter().for_each(|output| tee.add(output.name.clone(), output));
+        outputs.into_iter().for_each(|output| tee.add_output(output.name.clone(), output));
         Ok(tee)
     }
 
-    /// Creates a tee without sinks, and the handle that adds and removes them. `name` is for the report. `tell` is
+    /// Creates a tee without sinks, and the handle that adds and removes them. `name` is for the report. `report` is
     /// called for each state change of a sink, also on the thread of the frames: it must be quick.
-    pub fn switched(name: &str, tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Switchboard) {
-        let (board, requests) = Switchboard::new(tell);
-        (Self::empty(name.into(), Backpressure::DropOldest, Arc::default(), Some(requests)), board)
+    pub fn with_control(name: &str, report: impl Fn(MemberEvent) + Send + Sync + 'static) -> (Self, TeeControl) {
+        let (control, requests) = TeeControl::new(report);
+        (Self::empty(name.into(), Backpressure::DropOldest, Arc::default(), Some(requests)), control)
     }
 
     fn empty(
@@ -85,41 +85,41 @@ impl Tee {
         Self {
             name,
             outputs: Vec::new(),
-            ending: Vec::new(),
+            closing: Vec::new(),
             requests,
             backpressure,
             closed,
-            pictures: Pictures::default(),
+            picture_pool: PicturePool::default(),
             captured_ns: 0,
-            failed: None,
-            frames: Vec::new(),
-            nodes: Vec::new(),
+            first_error: None,
+            output_counters: Vec::new(),
+            node_counters: Vec::new(),
         }
     }
 
-    fn add(&mut self, name: String, output: OutputThread) {
-        self.frames.push(output.counter());
-        self.nodes.extend_from_slice(output.nodes());
+    fn add_output(&mut self, name: String, output: OutputThread) {
+        self.output_counters.push(output.create_counter());
+        self.node_counters.extend_from_slice(output.node_counters());
         self.outputs.push((name, output));
     }
 
-    /// Handles the switchboard's pending requests, and forgets outputs that have ended.
+    /// Handles the control's pending requests, and forgets outputs that have ended.
     fn handle_requests(&mut self) {
         while let Some(request) = self.requests.as_ref().and_then(|requests| requests.try_recv().ok()) {
             let name = request.name().to_owned();
             if let Some(at) = self.outputs.iter().position(|(output, _)| *output == name) {
                 let (_, mut output) = self.outputs.remove(at);
-                output.close(Ending::Whole);
-                self.ending.push(output);
+                output.close(Ending::Complete);
+                self.closing.push(output);
             }
             if let Request::Add(member) = request
                 && let Some(output) = member.start()
             {
-                self.add(name, output);
+                self.add_output(name, output);
             }
         }
         if self.requests.is_some() {
-            self.outputs.retain_mut(|(_, output)| output.outcome().is_none());
+            self.outputs.retain_mut(|(_, output)| output.try_outcome().is_none());
         }
     }
 
@@ -127,22 +127,22 @@ impl Tee {
     fn send_frame(&mut self, frame: &ColorImage, time_ns: u64, is_card: bool) -> Result<ControlFlow<()>, SinkError> {
         self.handle_requests();
         if !self.outputs.is_empty() {
-            let picture = self.pictures.copy_frame(frame, time_ns, self.captured_ns, is_card);
+            let picture = self.picture_pool.copy_frame(frame, time_ns, self.captured_ns, is_card);
             for (_, output) in &mut self.outputs {
-                let mut left = output.send(Arc::clone(&picture), TICK);
-                while let Some(picture) = left {
+                let mut unsent = output.send(Arc::clone(&picture), TICK);
+                while let Some(picture) = unsent {
                     if self.closed.load(Ordering::Acquire) {
                         output.count_lost();
                         break;
                     }
-                    left = output.send(picture, TICK);
+                    unsent = output.send(picture, TICK);
                 }
             }
         }
         self.remove_ended()
     }
 
-    /// Removes outputs that have ended, unless a switchboard manages them. Returns `Break` if none accepts frames any
+    /// Removes outputs that have ended, unless a control manages them. Returns `Break` if none accepts frames any
     /// more.
     fn remove_ended(&mut self) -> Result<ControlFlow<()>, SinkError> {
         if self.requests.is_some() {
@@ -150,7 +150,7 @@ impl Tee {
         }
         let mut at = 0;
         while at < self.outputs.len() {
-            let Some(outcome) = self.outputs[at].1.outcome() else {
+            let Some(outcome) = self.outputs[at].1.try_outcome() else {
                 at += 1;
                 continue;
             };
@@ -163,7 +163,7 @@ impl Tee {
         if self.outputs.iter().any(|(_, output)| output.is_open()) {
             return Ok(ControlFlow::Continue(()));
         }
-        match self.failed.take_if(|_| self.outputs.is_empty()) {
+        match self.first_error.take_if(|_| self.outputs.is_empty()) {
             Some(error) => Err(error),
             None => Ok(ControlFlow::Break(())),
         }
@@ -174,25 +174,25 @@ impl Tee {
         let Some(error) = error else { return };
         if !self.outputs.is_empty() {
             tracing::warn!("{error}; continuing without it");
-        } else if self.failed.is_some() {
+        } else if self.first_error.is_some() {
             tracing::error!("{error}");
         }
-        self.failed.get_or_insert(error);
+        self.first_error.get_or_insert(error);
     }
 
     /// Completes all outputs in parallel, and waits for them; returns the first error, and logs the others unless they
-    /// were reported to a switchboard's owner.
-    fn end(&mut self, ending: Ending) -> Result<(), SinkError> {
+    /// were reported to a control's owner.
+    fn finish_outputs(&mut self, ending: Ending) -> Result<(), SinkError> {
         self.handle_requests();
         self.outputs.iter_mut().for_each(|(_, output)| output.close(ending));
         let is_reported = self.requests.is_some();
-        let all = mem::take(&mut self.ending)
+        let all = mem::take(&mut self.closing)
             .into_iter()
             .chain(mem::take(&mut self.outputs).into_iter().map(|(_, output)| output));
         let ended: Vec<_> = all.map(OutputThread::join).collect();
-        // Failures during the run that were reported to the switchboard's owner are not errors of the run.
+        // Failures during the run that were reported to the control's owner are not errors of the run.
         let ended = ended.into_iter().filter(|outcome| !(is_reported && matches!(outcome, Outcome::Failed(_))));
-        let mut errors = self.failed.take().into_iter().chain(ended.filter_map(Outcome::error));
+        let mut errors = self.first_error.take().into_iter().chain(ended.filter_map(Outcome::error));
         let first = errors.next();
         errors.filter(|_| !is_reported).for_each(|error| tracing::error!("{error}"));
         first.map_or(Ok(()), Err)
@@ -200,15 +200,15 @@ impl Tee {
 }
 
 impl Sink for Tee {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.send_frame(frame, time_ns, false)
     }
 
-    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.send_frame(card, time_ns, true)
     }
 
-    fn captured(&mut self, captured_ns: u64) {
+    fn set_capture_time(&mut self, captured_ns: u64) {
         self.captured_ns = captured_ns;
     }
 
@@ -216,43 +216,43 @@ impl Sink for Tee {
         self.requests.is_none() && self.outputs.iter().any(|(_, output)| output.is_live)
     }
 
-    fn uncovered(&self) -> Vec<Uncovered> {
-        self.outputs.iter().filter_map(|(_, output)| output.uncovered()).collect()
+    fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
+        self.outputs.iter().filter_map(|(_, output)| output.without_card()).collect()
     }
 
-    /// Counters of all outputs ever added; with a switchboard, only of the current ones.
-    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+    /// Counters of all outputs ever added; with a control, only of the current ones.
+    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
         match self.requests {
-            Some(_) => self.outputs.iter().flat_map(|(_, output)| output.nodes()).cloned().collect(),
-            None => self.nodes.clone(),
+            Some(_) => self.outputs.iter().flat_map(|(_, output)| output.node_counters()).cloned().collect(),
+            None => self.node_counters.clone(),
         }
     }
 
     /// Counters of all outputs ever added.
-    fn outputs(&self) -> Vec<Counter<OutputUse>> {
-        self.frames.clone()
+    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
+        self.output_counters.clone()
     }
 
     /// The outputs repeat their pictures themselves; this tick is for ended outputs and requests.
-    fn hold(&self) -> Option<Duration> {
+    fn repeat_interval(&self) -> Option<Duration> {
         (self.backpressure == Backpressure::DropOldest || self.is_live()).then_some(TICK)
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         self.handle_requests();
         Ok(self.remove_ended()?.map_continue(|()| false))
     }
 
-    fn pass_by(&mut self) {
+    fn skip_frame(&mut self) {
         self.handle_requests();
     }
 
-    fn keeps(&self) -> bool {
+    fn has_outputs(&self) -> bool {
         self.requests.is_none() || !self.outputs.is_empty()
     }
 
     fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
-        self.end(ending)
+        self.finish_outputs(ending)
     }
 
     fn describe(&self) -> String {
@@ -264,7 +264,7 @@ impl Drop for Tee {
     fn drop(&mut self) {
         if self.requests.is_some() {
             // The errors were reported.
-            let _ = self.end(Ending::Cut);
+            let _ = self.finish_outputs(Ending::Truncated);
         }
     }
 }

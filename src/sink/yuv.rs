@@ -56,7 +56,7 @@ impl Converter {
     /// Appends the planes of `image` to `planes`: Y of `height * width` bytes, then Cb and Cr of `ceil(height / 2) *
     /// ceil(width / 2)` each, sited in the centre of their 2 x 2 pixels, as the y4m tag `C420jpeg` says. At an odd edge
     /// the last column or row counts twice.
-    pub fn append(&self, image: &ColorImage, planes: &mut Vec<u8>) {
+    pub fn append_planes(&self, image: &ColorImage, planes: &mut Vec<u8>) {
         let (width, height) = (image.width as usize, image.height as usize);
         let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
         let start = planes.len();

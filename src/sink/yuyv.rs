@@ -18,7 +18,7 @@ impl Encoder {
 
     /// Encodes `picture` into `yuyv`, which has two bytes per pixel.
     pub fn encode(&self, picture: &ColorImage, yuyv: &mut [u8]) {
-        self.arch.dispatch(Yuyv { rgb: &picture.rgb, yuyv });
+        self.arch.dispatch(YuyvEncode { rgb: &picture.rgb, yuyv });
     }
 }
 
@@ -32,12 +32,12 @@ impl Default for Encoder {
 const BLOCK: usize = 64;
 
 /// Converts an even number of pixels, with all rows as one: every pair from the first pixel on shares its chroma.
-struct Yuyv<'a> {
+struct YuyvEncode<'a> {
     rgb: &'a [u8],
     yuyv: &'a mut [u8],
 }
 
-impl WithSimd for Yuyv<'_> {
+impl WithSimd for YuyvEncode<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -301,7 +301,7 @@ fn exists() -> SinkError {
 }
 
 impl Sink for FakeSink {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let index = self.received.count() as usize;
         if self.trouble.strikes(index) {
             return Err(exists());
@@ -325,18 +325,18 @@ impl Sink for FakeSink {
 struct SinkBy<F>(bool, F);
 
 impl<F: FnMut(&ColorImage) + Send> Sink for SinkBy<F> {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         (self.1)(frame);
         Ok(ControlFlow::Continue(()))
     }
-    fn keeps(&self) -> bool {
+    fn has_outputs(&self) -> bool {
         self.0
     }
 }
 
-/// Creates a sink that calls `put` with each frame.
-pub fn sink_by(put: impl FnMut(&ColorImage) + Send + 'static) -> Box<dyn Sink> {
-    Box::new(SinkBy(true, put))
+/// Creates a sink that calls `write` with each frame.
+pub fn sink_by(write: impl FnMut(&ColorImage) + Send + 'static) -> Box<dyn Sink> {
+    Box::new(SinkBy(true, write))
 }
 
 /// Creates a sink that accepts frames and reports that it has no viewers.

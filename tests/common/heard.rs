@@ -14,7 +14,7 @@ use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
 use bokehcam_window::services::Services;
-use bokehcam_window::session::{Session, SessionEvent, Start, Still};
+use bokehcam_window::session::{Session, SessionConfig, SessionEvent, Still};
 use bokehcam_window::state::Update;
 
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -60,7 +60,7 @@ impl Heard {
     pub fn begin(services: Box<dyn Services>, source: &str, folder: &Path) -> Self {
         let demand = Demand::default();
         let watch = Some(demand.watch());
-        let start = Start {
+        let config = SessionConfig {
             services,
             look: look(),
             source: source.into(),
@@ -72,22 +72,22 @@ impl Heard {
             output_request: Arc::default(),
             demand: demand.clone(),
             off: Arc::default(),
-            release: Arc::default(),
+            shutter: Arc::default(),
         };
-        let session = Session::begin(start, Arc::new(|| {})).unwrap();
+        let session = Session::start(config, Arc::new(|| {})).unwrap();
         let (told, blurred) = (Vec::new(), Vec::new());
         Self { session, views: None, guide: None, seeker: None, told, copied: None, blurred, watch, demand }
     }
 
     pub fn hear(&mut self) {
-        while let Some(heard) = self.session.hear() {
+        while let Some(heard) = self.session.try_recv_event() {
             match heard {
                 SessionEvent::Update(told) => self.told.push(told),
-                SessionEvent::Views(views, guide, seeker) => {
+                SessionEvent::RunStarted(views, guide, seeker) => {
                     (self.views, self.guide, self.seeker) = (Some(views), guide, seeker);
                 }
                 SessionEvent::Copy(text) => self.copied = Some(text),
-                SessionEvent::Blurred(blurred) => self.blurred.push(*blurred),
+                SessionEvent::Reblurred(blurred) => self.blurred.push(*blurred),
             }
         }
     }

@@ -1,7 +1,7 @@
 //! A settings store without a file.
 
 use bokehcam::look::{Look, presets::Preset};
-use bokehcam_window::services::{SettingsStore, Switch};
+use bokehcam_window::services::{CliOption, SettingsStore};
 
 /// Has no presets and saves none; a command lists its own parts.
 pub struct NoStore;
@@ -19,7 +19,7 @@ impl SettingsStore for NoStore {
     fn delete_preset(&mut self, _: &str) -> Result<(), String> {
         Err("no file".into())
     }
-    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+    fn format_command(&self, _: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
         format!("show {source} {outputs:?} {switches:?}")
     }
 }

@@ -80,7 +80,7 @@ fn corrupt_frames_end_the_run_or_are_counted() {
     let setup = |keep_going| Setup { corrupt_every: 4, keep_going, ..Setup::new(20, Pace::Asap) };
     let (result, received) = setup(false).run();
     let error = result.unwrap_err();
-    assert!(matches!(error.fault, Fault::Capture(_)) && received.ending() == Some(Ending::Cut));
+    assert!(matches!(error.fault, Fault::Capture(_)) && received.ending() == Some(Ending::Truncated));
     assert_eq!((error.report.frames.captured, error.report.frames.dropped.corrupt), (4, 1));
 
     let (result, received) = setup(true).run();

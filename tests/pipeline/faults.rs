@@ -37,7 +37,7 @@ fn the_fault_of_a_stage_is_the_error_of_the_run() {
                     continue;
                 };
                 assert!(expected(&error.fault), "{stage} at {frame}: {error}");
-                assert_eq!(received.ending(), Some(Ending::Cut), "{stage} at {frame}");
+                assert_eq!(received.ending(), Some(Ending::Truncated), "{stage} at {frame}");
                 if pace == Pace::Asap {
                     assert!(error.report.frames.captured < 500, "{stage} at {frame} ended the run");
                     assert!(received.count() <= frame as u64);
@@ -63,7 +63,7 @@ fn a_panic_is_the_error_of_its_stage() {
         let (result, received) = setup.run();
         let text = result.unwrap_err().to_string();
         assert_eq!(text, format!("the {stage} stage panicked: out of order at frame 5; please report this"));
-        assert_eq!(received.ending(), Some(Ending::Cut), "{stage}");
+        assert_eq!(received.ending(), Some(Ending::Truncated), "{stage}");
     }
 }
 
@@ -87,7 +87,7 @@ fn a_reader_that_goes_ends_the_run_cleanly() {
     let (result, received) = Setup { closes_at: 6, ..Setup::new(300, Pace::Asap) }.run();
     let frames = result.unwrap().frames;
     assert_eq!((frames.delivered, received.count(), frames.dropped.total()), (6, 6, 0));
-    assert_eq!(received.ending(), Some(Ending::Whole), "as far as anybody wanted it");
+    assert_eq!(received.ending(), Some(Ending::Complete), "as far as anybody wanted it");
     assert!(frames.captured < 300 && frames.in_flight > 0, "what was under way stays in flight: {frames:?}");
 }
 
@@ -98,7 +98,7 @@ fn stop_finishes_what_is_in_hand() {
         let frames = result.unwrap().frames;
         assert_eq!(frames.in_flight, 0);
         assert!(frames.delivered >= 8 && frames.captured < 5000, "{frames:?}");
-        assert_eq!(received.ending(), Some(Ending::Cut), "the source had an end of its own");
+        assert_eq!(received.ending(), Some(Ending::Truncated), "the source had an end of its own");
     }
 }
 
@@ -166,7 +166,7 @@ fn of_several_sinks_the_good_ones_go_on_to_the_end() {
         let failed = run(simple(Box::new(fake_camera(9)), Box::new(tee), &stop, Pace::Asap)).unwrap_err();
         assert!(matches!(failed.fault, Fault::Sink(_)), "{failed}");
         assert_eq!((bad.count(), good.count(), failed.report.frames.delivered), (2, 9, 9));
-        assert_eq!((bad.ending(), good.ending()), (None, Some(Ending::Whole)));
+        assert_eq!((bad.ending(), good.ending()), (None, Some(Ending::Complete)));
     }
 }
 

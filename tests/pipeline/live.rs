@@ -69,16 +69,16 @@ impl Screen {
 }
 
 impl Sink for Screen {
-    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         // Frames under way when the last viewer left are not shown.
         Ok(if self.watch.is_some() { self.show() } else { ControlFlow::Continue(()) })
     }
 
-    fn hold(&self) -> Option<Duration> {
+    fn repeat_interval(&self) -> Option<Duration> {
         Some(if self.watch.is_some() { Duration::from_secs(600) } else { Duration::from_millis(20) })
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         assert!(self.watch.is_none(), "the camera's pictures come before the hold is over");
         Ok(self.show().map_continue(|()| true))
     }

@@ -58,7 +58,7 @@ impl Camera {
 }
 
 impl Sink for Camera {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.note::<3>(&frame.rgb);
         Ok(ControlFlow::Continue(()))
     }
@@ -67,7 +67,7 @@ impl Sink for Camera {
         (self.wants)(self.came.lock().unwrap().len())
     }
 
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         assert_eq!((frame.size(), frame.bytes.len()), (SIZE, 2 * (SIZE.0 * SIZE.1) as usize));
         self.note::<2>(&frame.bytes);
         std::mem::swap(&mut self.last, &mut frame.bytes);

@@ -11,7 +11,7 @@ const SIZE: (u32, u32) = (1280, 720);
 const ROUNDS: usize = 60;
 
 /// Returns the median milliseconds of each, run in turns.
-fn medians<const N: usize>(mut runs: [&mut dyn FnMut(); N]) -> [f64; N] {
+fn median_times_ms<const N: usize>(mut runs: [&mut dyn FnMut(); N]) -> [f64; N] {
     let mut times = [const { Vec::new() }; N];
     for _ in 0..ROUNDS {
         for (run, times) in runs.iter_mut().zip(&mut times) {
@@ -27,7 +27,7 @@ fn medians<const N: usize>(mut runs: [&mut dyn FnMut(); N]) -> [f64; N] {
 }
 
 /// The usual way: each pixel in floating point, with the chroma of its pair.
-fn plain(yuyv: &[u8], rgb: &mut [u8]) {
+fn decode_yuyv_float(yuyv: &[u8], rgb: &mut [u8]) {
     for (bytes, pixels) in yuyv.chunks_exact(4).zip(rgb.chunks_exact_mut(6)) {
         let (cb, cr) = (f32::from(bytes[1]) - 128.0, f32::from(bytes[3]) - 128.0);
         for (pixel, luma) in pixels.chunks_exact_mut(3).zip([bytes[0], bytes[2]]) {
@@ -51,8 +51,9 @@ fn main() {
         let yuyv: Vec<u8> = (0..2 * SIZE.0 * SIZE.1).map(|_| byte()).collect();
         let (mut decoder, mut out) = (Decoder::new(&layout).unwrap(), ColorImage::default());
         let mut other = ColorImage::new(SIZE.0, SIZE.1);
-        let [ours, plain] =
-            medians([&mut || decoder.decode(&[&memory], &mut out).unwrap(), &mut || plain(&yuyv, &mut other.rgb)]);
+        let [ours, plain] = median_times_ms([&mut || decoder.decode(&[&memory], &mut out).unwrap(), &mut || {
+            decode_yuyv_float(&yuyv, &mut other.rgb)
+        }]);
         println!("{fourcc:>5}: {ours:6.3} ms; YUYV by floating point {plain:6.3} ms; ratio {:5.1}", plain / ours);
     }
     // A JPEG of this size, such as `ffmpeg -i PICTURE -vf scale=1280:720 -c:v mjpeg -pix_fmt yuvj422p -q:v 5 x.jpg`.
@@ -63,7 +64,7 @@ fn main() {
     let jpeg = std::fs::read(&path).unwrap();
     let layout = Layout::packed(FourCc::MJPG, SIZE.0, SIZE.1).unwrap();
     let (mut decoder, mut out) = (Decoder::new(&layout).unwrap(), ColorImage::default());
-    let [ours, image] = medians([&mut || decoder.decode(&[&jpeg], &mut out).unwrap(), &mut || {
+    let [ours, image] = median_times_ms([&mut || decoder.decode(&[&jpeg], &mut out).unwrap(), &mut || {
         image::load_from_memory_with_format(&jpeg, image::ImageFormat::Jpeg).unwrap();
     }]);
     println!(

@@ -19,7 +19,7 @@ use bokehcam::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 
 /// The variants: the postprocessing, and whether the background is remembered. Each includes all of the previous one.
-const WAYS: [(&str, Postprocess, bool); 4] = [
+const VARIANTS: [(&str, Postprocess, bool); 4] = [
     ("matte", Postprocess::Keep, false),
     ("+ holes", Postprocess::Fill, false),
     ("+ refinement", Postprocess::Refine, false),
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
         Ok(options) => options,
         Err(code) => return code,
     };
-    match measure(&options) {
+    match measure_postprocessing(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -58,7 +58,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
+fn measure_postprocessing(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     let recording = Recording::open(&options.recording, &Reading::default())?;
     let mut scratch = Scratch::default();
     let mut frames = Vec::new();
@@ -70,20 +70,20 @@ fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     }
     let lens = CocAtInfinity::Px(options.coc_at_infinity);
     let rule = CocRule::Depth { focus: FocusRule::Auto, lens, range_m: 0.0, max_coc_px: 64.0 };
-    let mut makers = WAYS.map(|(_, finish, remembers)| {
-        let mut maker = CocCalculator::new(rule, finish);
-        maker.set_background_memory(remembers);
-        maker
+    let mut calculators = VARIANTS.map(|(_, finish, remembers)| {
+        let mut calculator = CocCalculator::new(rule, finish);
+        calculator.set_background_memory(remembers);
+        calculator
     });
-    let (mut taken_ms, mut sums) = (WAYS.map(|_| Vec::new()), WAYS.map(|_| DefaultHasher::new()));
+    let (mut taken_ms, mut sums) = (VARIANTS.map(|_| Vec::new()), VARIANTS.map(|_| DefaultHasher::new()));
     let mut map = DepthMap::default();
     for k in 0..options.rounds * frames.len() {
         let there = k % (2 * frames.len());
         let (color, measured) = &frames[there.min(2 * frames.len() - 1 - there)];
-        for ((maker, taken_ms), sum) in makers.iter_mut().zip(&mut taken_ms).zip(&mut sums) {
+        for ((calculator, taken_ms), sum) in calculators.iter_mut().zip(&mut taken_ms).zip(&mut sums) {
             map.clone_from(measured);
             let began_ns = process_cpu_ns();
-            maker.compute(&mut map, color, k as u64 * 33_333_333);
+            calculator.compute(&mut map, color, k as u64 * 33_333_333);
             taken_ms.push((process_cpu_ns() - began_ns) as f64 / 1e6);
             map.metres.iter().for_each(|metres| metres.to_bits().hash(sum));
             for pixel in &map.matte.pixels {
@@ -92,7 +92,7 @@ fn measure(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     println!("{:14} {:>8} {:>8}  checksum", "processor ms", "best", "median");
-    for (((name, ..), taken_ms), sum) in WAYS.iter().zip(&mut taken_ms).zip(&sums) {
+    for (((name, ..), taken_ms), sum) in VARIANTS.iter().zip(&mut taken_ms).zip(&sums) {
         taken_ms.sort_unstable_by(f64::total_cmp);
         println!("{name:14} {:8.2} {:8.2}  {:016x}", taken_ms[0], taken_ms[taken_ms.len() / 2], sum.finish());
     }

@@ -23,7 +23,7 @@ use image::imageops::{FilterType, resize};
 /// Frames of the sequence that are played, back and forth.
 const FRAMES: usize = 24;
 /// The background of the sequence is farther than this, in metres.
-const BEHIND_M: f32 = 1.8;
+const MIN_BACKGROUND_M: f32 = 1.8;
 
 #[derive(Parser)]
 struct Options {
@@ -50,7 +50,7 @@ fn main() -> ExitCode {
         Err(code) => return code,
     };
     match std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from) {
-        Some(data) => measure(&options, &data).map_or_else(
+        Some(data) => measure_sources(&options, &data).map_or_else(
             |error| {
                 eprintln!("error: {error}");
                 ExitCode::FAILURE
@@ -73,9 +73,9 @@ struct Case {
     processor_ms: f64,
 }
 
-fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    let (pictures, plate) = pictures(data, (options.size[0], options.size[1]))?;
-    let (matte, mono) = (model(data, Task::Matte)?, model(data, Task::Mono)?);
+fn measure_sources(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let (pictures, plate) = load_pictures(data, (options.size[0], options.size[1]))?;
+    let (matte, mono) = (find_model(data, Task::Matte)?, find_model(data, Task::Mono)?);
     let networks = |matte: Option<&Path>, mono: Option<&Path>| {
         SingleCamera::open(matte, mono, &Hints::default(), options.network_runtime)
     };
@@ -124,7 +124,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
 
 /// Returns the pictures of the sequence in this size, and its background: for each pixel, the colour at its farthest
 /// depth.
-fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImage), Box<dyn std::error::Error>> {
+fn load_pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImage), Box<dyn std::error::Error>> {
     let options = recording::Options { depth_scale: 1000.0, ..recording::Options::default() };
     let recording = Recording::open(&data.join("rgbd/person_turning"), &options)?;
     let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
@@ -142,17 +142,17 @@ fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImag
                 plate.rgb[3 * at..3 * at + 3].copy_from_slice(&color.rgb[3 * at..3 * at + 3]);
             }
         }
-        pictures.push(enlarged(&color, size));
+        pictures.push(crop_and_resize(&color, size));
     }
     // Pixels that no frame uncovered are filled from the left neighbour.
-    for at in (1..farthest_m.len()).filter(|&at| farthest_m[at] < BEHIND_M) {
+    for at in (1..farthest_m.len()).filter(|&at| farthest_m[at] < MIN_BACKGROUND_M) {
         plate.rgb.copy_within(3 * (at - 1)..3 * at, 3 * at);
     }
-    Ok((pictures, enlarged(&plate, size)))
+    Ok((pictures, crop_and_resize(&plate, size)))
 }
 
 /// Crops the middle of a picture and scales it to another size.
-fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
+fn crop_and_resize(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
     let rows = (color.width * height / width).min(color.height);
     let first = ((color.height - rows) / 2 * color.width * 3) as usize;
     let middle = color.rgb[first..][..(rows * color.width * 3) as usize].to_vec();
@@ -161,7 +161,7 @@ fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
 }
 
 /// Returns the file of the first known network for a task that exists.
-fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
+fn find_model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
     let folder = data.join("models");
     find_best_in(vec![folder.clone()], task)
         .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()).into())

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use rfd::FileDialog;
 
-use super::services::Browse;
+use super::services::PathKind;
 use bokehcam::files::data;
 
 /// Error shown if the desktop has no file chooser.
@@ -18,21 +18,21 @@ const MIN_DIALOG_TIME: Duration = Duration::from_millis(250);
 ///
 /// # Errors
 /// Returns a one-line message with the alternatives if there is no dialog.
-pub fn pick(what: Browse) -> Result<Option<String>, String> {
+pub fn choose_path(kind: PathKind) -> Result<Option<String>, String> {
     if !has_portal() && !has_zenity() {
         return Err(NO_DIALOG.to_owned());
     }
     let opened_at = Instant::now();
-    let picked = match what {
-        Browse::Folder => FileDialog::new().set_title("Open a recording: its folder").pick_folder(),
-        Browse::Photo | Browse::Behind => {
-            let title = if what == Browse::Photo { "Open a photo" } else { "A picture behind the subject" };
+    let picked = match kind {
+        PathKind::Folder => FileDialog::new().set_title("Open a recording: its folder").pick_folder(),
+        PathKind::Photo | PathKind::Background => {
+            let title = if kind == PathKind::Photo { "Open a photo" } else { "A picture behind the subject" };
             let photos = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
             FileDialog::new().set_title(title).add_filter("Photos", &photos).pick_file()
         }
     };
     match picked {
-        Some(path) => name_of(&path).map(Some),
+        Some(path) => path_to_name(&path).map(Some),
         None if opened_at.elapsed() < MIN_DIALOG_TIME => Err(NO_DIALOG.to_owned()),
         None => Ok(None),
     }
@@ -42,7 +42,7 @@ pub fn pick(what: Browse) -> Result<Option<String>, String> {
 ///
 /// # Errors
 /// Fails if the path is not valid UTF-8.
-pub fn name_of(path: &Path) -> Result<String, String> {
+pub fn path_to_name(path: &Path) -> Result<String, String> {
     let not_utf8 = || format!("{}: its name is not UTF-8 text; rename it to open it here", path.display());
     path.to_str().map(str::to_owned).ok_or_else(not_utf8)
 }

@@ -63,15 +63,15 @@ const fn ctrl_shift(key: Key) -> Chord {
     Chord { key, ctrl: true, shift: true }
 }
 
-type Make = fn(&State, Context) -> Option<Action>;
+type MakeAction = fn(&State, Context) -> Option<Action>;
 
 /// Creates a binding that acts once per press.
-const fn once(chords: &'static [Chord], keys: &'static str, help: &'static str, make: Make) -> Binding {
+const fn bind_once(chords: &'static [Chord], keys: &'static str, help: &'static str, make: MakeAction) -> Binding {
     Binding { chords, keys, help, repeats: false, make }
 }
 
 /// Creates a binding that repeats while the key is held.
-const fn repeat(chords: &'static [Chord], keys: &'static str, help: &'static str, make: Make) -> Binding {
+const fn bind_repeating(chords: &'static [Chord], keys: &'static str, help: &'static str, make: MakeAction) -> Binding {
     Binding { chords, keys, help, repeats: true, make }
 }
 
@@ -89,28 +89,28 @@ fn toggle_view(state: &State, shown: Shown) -> Option<Action> {
 }
 
 /// Returns the direction of a pair of opposite keys: -1 for the first chord of the pair, 1 for the second.
-fn sign(context: Context) -> f32 {
+fn direction_sign(context: Context) -> f32 {
     if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
 
 /// Returns the action of Esc: closes the topmost open item, one per press.
 fn close_topmost(state: &State) -> Option<Action> {
     if state.closing {
-        Some(Action::StayOpen)
+        Some(Action::CancelClose)
     } else if state.self_timer {
         Some(Action::SelfTimer(false))
     } else if state.help {
         Some(Action::Help(false))
-    } else if state.trouble.is_some() {
-        Some(Action::Dismiss)
-    } else if let Some(way) = state.way_without_plate() {
-        Some(Action::DepthBy(way))
-    } else if state.offers_depth() && !state.bare {
-        Some(Action::DeclinePlate)
-    } else if state.is_demonstration() && !state.knows_demonstration && !state.bare {
-        Some(Action::KnowDemonstration)
-    } else if state.bare {
-        Some(Action::Bare(false))
+    } else if state.output_failure.is_some() {
+        Some(Action::DismissFailure)
+    } else if let Some(depth_method) = state.method_without_plate() {
+        Some(Action::SetDepthMethod(depth_method))
+    } else if state.offers_depth_methods() && !state.controls_hidden {
+        Some(Action::DeclineDepthOffer)
+    } else if state.is_demonstration() && !state.demonstration_dismissed && !state.controls_hidden {
+        Some(Action::DismissDemonstration)
+    } else if state.controls_hidden {
+        Some(Action::HideControls(false))
     } else if state.full_screen {
         Some(Action::FullScreen(false))
     } else if state.panel {
@@ -133,7 +133,7 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "Look",
         bindings: &[
-            once(
+            bind_once(
                 &[
                     key(Key::Num1),
                     key(Key::Num2),
@@ -149,56 +149,65 @@ pub const GROUPS: [Group; 5] = [
                 "the preset of that number",
                 |state, context| state.presets.get(context.chord).map(|preset| Action::Preset(preset.name.clone())),
             ),
-            repeat(
+            bind_repeating(
                 &[key(Key::OpenBracket), key(Key::CloseBracket)],
                 "[  ]",
                 "less blur, more blur",
                 |state, context| {
-                    let factor = THIRD_STOP.powf(sign(context));
-                    edit_look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
+                    let factor = THIRD_STOP.powf(direction_sign(context));
+                    edit_look(state, "key blur", |look| tweak::scale_blur(look, factor, context.size.1))
                 },
             ),
-            repeat(
+            bind_repeating(
                 &[key(Key::Semicolon), key(Key::Quote)],
                 ";  '",
                 "smaller f-number, larger f-number",
                 |state, context| {
-                    let factor = THIRD_STOP.powf(sign(context));
+                    let factor = THIRD_STOP.powf(direction_sign(context));
                     edit_look(state, "key f-number", |look| {
-                        tweak::f_number_by(look, factor, state.distance_m(), context.size)
+                        tweak::scale_f_number(look, factor, state.focus_distance_m(), context.size)
                     })
                 },
             ),
-            repeat(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
-                edit_look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * sign(context)))
-            }),
-            repeat(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
-            repeat(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
-            once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
+            bind_repeating(
+                &[key(Key::Comma), key(Key::Period)],
+                ",  .",
+                "less in focus, more in focus",
+                |state, context| {
+                    edit_look(state, "key focal range", |look| {
+                        tweak::widen_focus_range(look, RANGE_STEP_M * direction_sign(context))
+                    })
+                },
+            ),
+            bind_repeating(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
+            bind_repeating(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
+            bind_once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
         ],
     },
     Group {
         name: "Focus",
         bindings: &[
-            once(&[key(Key::T)], "T", "take a plate (the empty room)", |_, _| Some(Action::TakePlate)),
-            once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
+            bind_once(&[key(Key::T)], "T", "take a plate (the empty room)", |_, _| Some(Action::CapturePlate)),
+            bind_once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
                 edit_look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
-            repeat(
+            bind_repeating(
                 &[key(Key::ArrowLeft), key(Key::ArrowRight)],
                 "Left, Right",
                 "move the point of focus, turn the sharp band",
                 |state, context| {
-                    let to_the_right = if state.mirror { -sign(context) } else { sign(context) };
+                    let to_the_right = if state.mirror { -direction_sign(context) } else { direction_sign(context) };
                     edit_look(state, "key arrows", |look| tweak::move_focus(look, FOCUS_STEP * to_the_right, 0.0))
                 },
             ),
-            repeat(
+            bind_repeating(
                 &[key(Key::ArrowUp), key(Key::ArrowDown)],
                 "Up, Down",
                 "move the point of focus, move the sharp band",
                 |state, context| {
-                    edit_look(state, "key arrows", |look| tweak::move_focus(look, 0.0, FOCUS_STEP * sign(context)))
+                    edit_look(state, "key arrows", |look| {
+                        tweak::move_focus(look, 0.0, FOCUS_STEP * direction_sign(context))
+                    })
                 },
             ),
         ],
@@ -206,52 +215,57 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "View",
         bindings: &[
-            once(&[key(Key::B)], "B", "before and after, side by side", |state, _| {
+            bind_once(&[key(Key::B)], "B", "before and after, side by side", |state, _| {
                 Some(Action::Split(if state.split.is_some() { None } else { Some(0.5) }))
             }),
-            once(&[key(Key::Z)], "Z", "freeze the picture, pause a recording", |state, _| {
+            bind_once(&[key(Key::Z)], "Z", "freeze the picture, pause a recording", |state, _| {
                 Some(Action::Freeze(!state.frozen))
             }),
-            repeat(
+            bind_repeating(
                 &[key(Key::PageUp), key(Key::PageDown)],
                 "PageUp, PageDown",
                 "in a recording: pause, one frame back or forward",
-                |state, context| state.transport.map(|_| Action::Step(sign(context) as i32)),
+                |state, context| state.transport.map(|_| Action::Step(direction_sign(context) as i32)),
             ),
-            once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
+            bind_once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
                 state.transport.map(|_| Action::Seek(0))
             }),
-            once(&[key(Key::X)], "X", "actual pixels (100 %), whole picture", |state, context| {
-                Some(Action::Zoom(if state.zoom.factor == 0 { state.zoom.stepped(1, context.fit) } else { 0 }, None))
+            bind_once(&[key(Key::X)], "X", "actual pixels (100 %), whole picture", |state, context| {
+                Some(Action::Zoom(
+                    if state.zoom.factor == 0 { state.zoom.next_factor(1, context.fit) } else { 0 },
+                    None,
+                ))
             }),
-            once(
+            bind_once(
                 &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
                 "Minus, Plus",
                 "smaller, larger: 100, 200, 400, 800 %",
-                |state, context| Some(Action::Zoom(state.zoom.stepped(sign(context) as i32, context.fit), None)),
+                |state, context| {
+                    Some(Action::Zoom(state.zoom.next_factor(direction_sign(context) as i32, context.fit), None))
+                },
             ),
-            once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
-            once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, Shown::Depth)),
-            once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, Shown::Coc)),
-            once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| toggle_view(state, Shown::Bins)),
+            bind_once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
+            bind_once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, Shown::Depth)),
+            bind_once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, Shown::Coc)),
+            bind_once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| toggle_view(state, Shown::Bins)),
         ],
     },
     Group {
         name: "Keep",
         bindings: &[
-            once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
-            once(&[shift(Key::S)], "Shift+S", "save a snapshot in three seconds", |state, _| {
+            bind_once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
+            bind_once(&[shift(Key::S)], "Shift+S", "save a snapshot in three seconds", |state, _| {
                 Some(Action::SelfTimer(!state.self_timer))
             }),
-            once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
+            bind_once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
                 Some(Action::Record(state.recording().is_none()))
             }),
-            once(&[key(Key::O)], "O", "start or stop the virtual camera", |state, _| {
+            bind_once(&[key(Key::O)], "O", "start or stop the virtual camera", |state, _| {
                 let first = || state.virtual_cameras.first().map(|choice| choice.name.clone());
                 Some(Action::VirtualCamera(if state.virtual_camera().is_some() { None } else { first() }))
             }),
-            once(&[key(Key::K)], "K", "copy as a command", |_, _| Some(Action::CopyCommand)),
-            once(&[key(Key::F5)], "F5", "reopen the source, look for new ones", |state, _| {
+            bind_once(&[key(Key::K)], "K", "copy as a command", |_, _| Some(Action::CopyCommand)),
+            bind_once(&[key(Key::F5)], "F5", "reopen the source, look for new ones", |state, _| {
                 let lost = matches!(state.source, Source::Lost(_) | Source::Ended);
                 Some(if lost { Action::Retry } else { Action::Refresh })
             }),
@@ -260,30 +274,34 @@ pub const GROUPS: [Group; 5] = [
     Group {
         name: "Window",
         bindings: &[
-            once(&[key(Key::P), key(Key::Space)], "P, Space", "the panel", |state, _| {
+            bind_once(&[key(Key::P), key(Key::Space)], "P, Space", "the panel", |state, _| {
                 Some(Action::Panel(!state.panel))
             }),
-            once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
-            once(&[key(Key::H)], "H", "only the picture", |state, _| Some(Action::Bare(!state.bare))),
-            once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
+            bind_once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
+            bind_once(&[key(Key::H)], "H", "only the picture", |state, _| {
+                Some(Action::HideControls(!state.controls_hidden))
+            }),
+            bind_once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
                 Some(Action::FullScreen(!state.full_screen))
             }),
-            // Minus is listed twice because `sign` takes chords in pairs; without Shift, Plus is Equals on many
+            // Minus is listed twice because `direction_sign` takes chords in pairs; without Shift, Plus is Equals on many
             // layouts.
-            repeat(
+            bind_repeating(
                 &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
                 "Ctrl+−  Ctrl++",
                 "smaller text, larger text",
-                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(sign(context)))),
+                |state, context| {
+                    Some(Action::TextScale(state.preferences.text_scale * TEXT_STEP.powf(direction_sign(context))))
+                },
             ),
-            once(&[ctrl(Key::Num0)], "Ctrl+0", "normal text size", |_, _| Some(Action::TextScale(1.0))),
-            once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
+            bind_once(&[ctrl(Key::Num0)], "Ctrl+0", "normal text size", |_, _| Some(Action::TextScale(1.0))),
+            bind_once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
                 Some(Action::Help(!state.help))
             }),
-            once(&[key(Key::Escape)], "Esc", "close the open dialog, leave full screen", |state, _| {
+            bind_once(&[key(Key::Escape)], "Esc", "close the open dialog, leave full screen", |state, _| {
                 close_topmost(state)
             }),
-            once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
+            bind_once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
                 Some(Action::Close)
             }),
         ],
@@ -299,7 +317,7 @@ fn is_handled_by_controls(chord: Chord) -> bool {
 /// Whether a key may trigger this action now: nothing may change unseen beneath the help or the closing dialog.
 fn is_allowed(action: &Action, state: &State) -> bool {
     match action {
-        Action::Close | Action::StayOpen => true,
+        Action::Close | Action::CancelClose => true,
         Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
         _ => !state.help && !state.closing,
     }
@@ -325,7 +343,7 @@ impl Chord {
 }
 
 /// Returns the action bound to a key event. While a control is `focused`, the keys it handles itself are ignored.
-pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> Option<Action> {
+pub fn action_for_event(event: &Event, state: &State, context: Context, focused: bool) -> Option<Action> {
     let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
     let bindings = GROUPS.iter().flat_map(|group| group.bindings);
     let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
@@ -333,7 +351,7 @@ pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> 
         Some((binding, chord))
     });
     let (binding, chord) = found?;
-    if !state.habits.single_keys && is_single_key(binding.chords[chord]) {
+    if !state.preferences.single_keys && is_single_key(binding.chords[chord]) {
         return None;
     }
     // Esc closes the closing dialog even while one of its buttons has the focus.

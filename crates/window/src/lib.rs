@@ -10,10 +10,10 @@
 
 pub mod dialog;
 pub mod keys;
-pub mod lent;
 pub mod meters;
 pub mod panel;
 pub mod present;
+pub mod remote_changes;
 pub mod services;
 pub mod session;
 pub mod state;

@@ -7,15 +7,15 @@ use bokehcam::pipeline::{Trace, View};
 use bokehcam::stats::{Frames, Histogram};
 
 /// Number of recent frames that the meters keep.
-pub const FRAMES: usize = 240;
+pub const GRAPH_FRAMES: usize = 240;
 /// Milliseconds per nanosecond.
-const MS: f64 = 1e-6;
+const MS_PER_NS: f64 = 1e-6;
 /// Weight of a new frame in the exponential moving averages, low enough that single outliers do not show.
 const SMOOTHING: f64 = 0.08;
 
 /// One frame in the graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bar {
+pub struct FrameSample {
     /// Duration of its blur, in milliseconds.
     pub blur_ms: f32,
     /// Time since the previously presented frame, in milliseconds; 0 for the first frame.
@@ -27,10 +27,10 @@ pub struct Bar {
 /// Statistics of the recent frames, and totals of the whole run.
 #[derive(Clone, Debug, Default)]
 pub struct Meters {
-    /// The last [`FRAMES`] frames, oldest first.
-    bars: VecDeque<Bar>,
-    latency_ms: Window<FRAMES>,
-    reaction_ms: Window<FRAMES>,
+    /// The last [`GRAPH_FRAMES`] frames, oldest first.
+    samples: VecDeque<FrameSample>,
+    latency_ms: Window<GRAPH_FRAMES>,
+    reaction_ms: Window<GRAPH_FRAMES>,
     /// Moving averages of the stage times.
     pub stages: Stages,
     /// Captured and dropped frames of the source.
@@ -50,7 +50,7 @@ pub struct Stages {
     pub depth_ms: f64,
     pub blur_ms: f64,
     /// Queueing time between the stages, including the delivery to the screen.
-    pub between_ms: f64,
+    pub queueing_ms: f64,
     pub playout_ms: f64,
     pub present_ms: f64,
     /// Fraction of the frames with a newly estimated depth map.
@@ -79,7 +79,7 @@ pub struct Totals {
     pub present: Histogram,
 }
 
-/// Numbers for the instruments over the last [`FRAMES`] frames.
+/// Numbers for the instruments over the last [`GRAPH_FRAMES`] frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     /// Presented frames per second.
@@ -92,12 +92,12 @@ pub struct Summary {
 
 impl Meters {
     /// Sets the start of the preview, from which the time to the first frame counts. Later calls have no effect.
-    pub fn begin(&mut self, now_ns: u64) {
+    pub fn set_start(&mut self, now_ns: u64) {
         self.started_ns.get_or_insert(now_ns);
     }
 
     /// Clears the recent frames for a new source; totals remain.
-    pub fn restart(&mut self) {
+    pub fn clear_recent(&mut self) {
         let (started_ns, totals) = (self.started_ns, std::mem::take(&mut self.totals));
         *self = Self { started_ns, totals, ..Self::default() };
     }
@@ -105,12 +105,12 @@ impl Meters {
     /// Records a frame presented at `now_ns` (run clock), where presenting took `present_ns`. Does not allocate.
     pub fn add_frame(&mut self, view: &View, now_ns: u64, present_ns: u64) {
         let latency_ns = now_ns.saturating_sub(view.captured_ns);
-        self.count(&view.trace, now_ns, latency_ns, present_ns);
+        self.record_times(&view.trace, now_ns, latency_ns, present_ns);
         self.frames = view.frames;
     }
 
     /// Adds a presented frame to the totals, the graph and the means.
-    fn count(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
+    fn record_times(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
         self.totals.presented += 1;
         self.totals.latency.add(latency_ns);
         self.totals.present.add(present_ns);
@@ -118,16 +118,16 @@ impl Meters {
             self.totals.first_frame_ns = Some(now_ns.saturating_sub(started_ns));
         }
         let last_ns = self.last_presented_ns.replace(now_ns);
-        let interval_ms = last_ns.map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
-        self.latency_ms.push(latency_ns as f64 * MS);
-        self.stages.add(trace, (latency_ns, present_ns), self.bars.is_empty());
-        if self.bars.len() == FRAMES {
-            self.bars.pop_front();
+        let interval_ms = last_ns.map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS_PER_NS);
+        self.latency_ms.push(latency_ns as f64 * MS_PER_NS);
+        self.stages.update(trace, (latency_ns, present_ns), self.samples.is_empty());
+        if self.samples.len() == GRAPH_FRAMES {
+            self.samples.pop_front();
         }
         // Reserves the full capacity on the first frame, so that later frames never allocate.
-        self.bars.reserve(FRAMES - self.bars.len());
-        self.bars.push_back(Bar {
-            blur_ms: (trace.blur_ns as f64 * MS) as f32,
+        self.samples.reserve(GRAPH_FRAMES - self.samples.len());
+        self.samples.push_back(FrameSample {
+            blur_ms: (trace.blur_ns as f64 * MS_PER_NS) as f32,
             interval_ms: interval_ms.unwrap_or_default() as f32,
             quality: trace.quality,
         });
@@ -136,7 +136,7 @@ impl Meters {
     /// Records the latency from an input to its effect on the screen.
     pub fn add_reaction(&mut self, after_ns: u64) {
         self.totals.reaction.add(after_ns);
-        self.reaction_ms.push(after_ns as f64 * MS);
+        self.reaction_ms.push(after_ns as f64 * MS_PER_NS);
     }
 
     /// Fills the meters with a plausible run, for screenshots of the instruments.
@@ -162,7 +162,7 @@ impl Meters {
                 playout_ns: 4_000_000,
                 ..Trace::default()
             };
-            self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
+            self.record_times(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
         }
         self.add_reaction(24_000_000);
         self.frames.captured = 300;
@@ -173,15 +173,15 @@ impl Meters {
     }
 
     /// Returns the recent frames, oldest first.
-    pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
-        self.bars.iter()
+    pub fn samples(&self) -> impl ExactSizeIterator<Item = &FrameSample> {
+        self.samples.iter()
     }
 
     /// Computes the summary of the recent frames. It sorts, so call it only a few times per second.
     pub fn summary(&self) -> Summary {
-        let spread = |window: &Window<FRAMES>| [0.5, 0.99].map(|p| window.percentile(FRAMES, p));
+        let spread = |window: &Window<GRAPH_FRAMES>| [0.5, 0.99].map(|p| window.percentile(GRAPH_FRAMES, p));
         // The first frame has no interval: it is 0.
-        let intervals = self.bars().map(|bar| f64::from(bar.interval_ms)).filter(|&ms| ms > 0.0);
+        let intervals = self.samples().map(|sample| f64::from(sample.interval_ms)).filter(|&ms| ms > 0.0);
         let (count, sum_ms) = intervals.fold((0.0, 0.0), |(count, sum), ms| (count + 1.0, sum + ms));
         Summary {
             fps: if sum_ms > 0.0 { 1000.0 * count / sum_ms } else { 0.0 },
@@ -193,11 +193,11 @@ impl Meters {
 
 impl Stages {
     /// Updates the averages with the times of a frame; the first frame initialises them.
-    fn add(&mut self, trace: &Trace, (latency_ns, present_ns): (u64, u64), first: bool) {
+    fn update(&mut self, trace: &Trace, (latency_ns, present_ns): (u64, u64), first: bool) {
         let weight = if first { 1.0 } else { SMOOTHING };
-        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
+        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS_PER_NS - *mean_ms) * weight;
         let to_screen_ns = latency_ns.saturating_sub(trace.age_ns + present_ns);
-        ease(&mut self.between_ms, trace.queueing_ns + to_screen_ns);
+        ease(&mut self.queueing_ms, trace.queueing_ns + to_screen_ns);
         ease(&mut self.playout_ms, trace.playout_ns);
         self.fresh_depth_fraction += (f64::from(u8::from(!trace.is_depth_reused)) - self.fresh_depth_fraction) * weight;
         ease(&mut self.decode_ms, trace.decode_ns);
@@ -222,7 +222,7 @@ mod tests {
 
     fn meters_after(frames: u64) -> Meters {
         let mut meters = Meters::default();
-        meters.begin(1_000);
+        meters.set_start(1_000);
         for k in 0..frames {
             let trace = Trace { blur_ns: 1_000_000 * k, quality: Some(Quality::Fast), ..Trace::default() };
             meters.count(&trace, 1_000 + (k + 1) * PERIOD_NS, 5_000_000 + k * 1_000, 2_000_000);
@@ -232,10 +232,10 @@ mod tests {
 
     #[test]
     fn the_last_frames_are_held_oldest_first() {
-        for frames in [0, 1, 7, FRAMES as u64, 3 * FRAMES as u64 + 5] {
+        for frames in [0, 1, 7, GRAPH_FRAMES as u64, 3 * GRAPH_FRAMES as u64 + 5] {
             let meters = meters_after(frames);
-            let held = frames.min(FRAMES as u64);
-            let blurs: Vec<f32> = meters.bars().map(|bar| bar.blur_ms).collect();
+            let held = frames.min(GRAPH_FRAMES as u64);
+            let blurs: Vec<f32> = meters.samples().map(|sample| sample.blur_ms).collect();
             assert_eq!(blurs.len() as u64, held);
             assert!(blurs.iter().zip(frames - held..).all(|(&ms, k)| (ms - k as f32).abs() < 1e-3), "{blurs:?}");
         }
@@ -257,8 +257,8 @@ mod tests {
     fn another_source_begins_anew_but_totals_go_on() {
         let mut meters = meters_after(10);
         meters.add_reaction(9_000_000);
-        meters.restart();
-        assert_eq!((meters.bars().len(), meters.summary()), (0, Summary::default()));
+        meters.clear_recent();
+        assert_eq!((meters.samples().len(), meters.summary()), (0, Summary::default()));
         assert_eq!((meters.totals.presented, meters.totals.reaction.samples()), (10, 1));
         meters.count(&Trace::default(), 10 * PERIOD_NS, 1, 1);
         assert_eq!(meters.totals.first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
@@ -293,9 +293,9 @@ mod tests {
                 meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
             }
             let stages = meters.stages;
-            let parts = [stages.depth_ms, stages.blur_ms, stages.between_ms, stages.playout_ms, stages.present_ms];
+            let parts = [stages.depth_ms, stages.blur_ms, stages.queueing_ms, stages.playout_ms, stages.present_ms];
             let depth_ms = 1.0 + 29.0 / every as f64;
-            assert!((stages.between_ms - 7.0).abs() < 1e-6, "{stages:?}");
+            assert!((stages.queueing_ms - 7.0).abs() < 1e-6, "{stages:?}");
             let sum_ms = parts.iter().sum::<f64>();
             assert!((sum_ms - (depth_ms + 25.0)).abs() < 1.5, "{every}: {sum_ms}");
             assert_eq!(u64::from(stages.depth_interval()), every);

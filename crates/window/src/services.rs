@@ -11,25 +11,25 @@ use bokehcam::sink::Sink;
 use bokehcam::source::{Source, devices::Choice};
 
 /// A command-line option that is not part of the look: name and value.
-pub type Switch = (String, String);
+pub type CliOption = (String, String);
 
 /// Kinds of paths that the user can choose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Browse {
+pub enum PathKind {
     /// The folder of a recording.
     Folder,
     /// The file of a photo.
     Photo,
     /// The file of a background picture.
-    Behind,
+    Background,
 }
 
 /// Opens a file chooser and blocks: returns the name of a source or a file, or `None` if cancelled. Errors are one
 /// line.
-pub type Pick = Box<dyn FnOnce() -> Result<Option<String>, String> + Send>;
+pub type FileChooser = Box<dyn FnOnce() -> Result<Option<String>, String> + Send>;
 
 /// An opened source.
-pub struct Opened {
+pub struct OpenedSource {
     /// Name on the command line.
     pub name: String,
     /// Its frames and their depth.
@@ -37,8 +37,8 @@ pub struct Opened {
     /// Whether its depth is used: it has depth, and the user did not decline it.
     pub has_depth: bool,
     /// Depth methods it supports, and the active one.
-    pub ways: Vec<DepthMethod>,
-    pub way: Option<DepthMethod>,
+    pub depth_methods: Vec<DepthMethod>,
+    pub depth_method: Option<DepthMethod>,
     /// Messages to the user: assumptions, and missing parts with where to get them.
     pub notes: Vec<String>,
     /// The camera's driver controls, such as exposure.
@@ -50,29 +50,29 @@ pub struct Opened {
 /// System services that a session needs.
 pub trait Services: Send {
     /// Returns the available sources.
-    fn sources(&mut self) -> Vec<Choice>;
+    fn list_sources(&mut self) -> Vec<Choice>;
 
     /// Returns the available virtual cameras.
-    fn virtual_cameras(&mut self) -> Vec<Choice>;
+    fn list_virtual_cameras(&mut self) -> Vec<Choice>;
 
-    /// Opens a source; an empty name is the first camera, or without a camera the demonstration. `way` is the depth
+    /// Opens a source; an empty name is the first camera, or without a camera the demonstration. `depth_method` is the depth
     /// method, `None` for the default; a background plate is captured at the start.
     ///
     /// # Errors
     /// Fails if it cannot be opened.
-    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String>;
+    fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String>;
 
     /// Checks that the source supports this depth method now.
     ///
     /// # Errors
     /// Returns a one-line message with advice if it does not.
-    fn check_depth_method(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
-        let _ = (name, way);
+    fn check_depth_method(&mut self, name: &str, depth_method: DepthMethod) -> Result<(), String> {
+        let _ = (name, depth_method);
         Ok(())
     }
 
     /// Whether devices appeared or disappeared since the last call.
-    fn devices_changed(&mut self) -> bool {
+    fn have_devices_changed(&mut self) -> bool {
         false
     }
 
@@ -80,19 +80,19 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Returns a one-line message if it is not.
-    fn check(&self, name: &str) -> Result<(), String> {
+    fn check_source_name(&self, name: &str) -> Result<(), String> {
         let _ = name;
         Ok(())
     }
 
     /// Returns a function that opens a file chooser.
-    fn browse(&self, what: Browse) -> Pick {
-        let _ = what;
+    fn create_file_chooser(&self, kind: PathKind) -> FileChooser {
+        let _ = kind;
         Box::new(|| Err("there is no file dialog".to_owned()))
     }
 
     /// Selects the frame size (width, height) and rate with which this source is opened from now on.
-    fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
+    fn set_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
         let _ = (name, size, fps);
     }
 
@@ -100,20 +100,20 @@ pub trait Services: Send {
     ///
     /// # Errors
     /// Fails if the camera rejects the value.
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String>;
+    fn set_control(&mut self, control: &str, value: i64) -> Result<Vec<CameraControl>, String>;
 
     /// Creates an executor for pictures of `size` pixels.
     ///
     /// # Errors
     /// Fails if the requested GPU does not exist.
-    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
+    fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
 
     /// Opens an output, a virtual camera or a file, for pictures of `size` pixels every `period_ns`; it ends once
     /// `stop` is set.
     ///
     /// # Errors
     /// Fails if it cannot be opened.
-    fn output(
+    fn open_output(
         &mut self,
         name: &str,
         size: (u32, u32),
@@ -123,7 +123,7 @@ pub trait Services: Send {
 
     /// Returns the command that shows `source` with this look: `bokehcam preview ...` with the window's `switches`, or
     /// `bokehcam stream ...` into `outputs`.
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String;
 
     /// Returns the settings store, which has the presets.
     fn settings(&mut self) -> &mut dyn SettingsStore;
@@ -152,6 +152,6 @@ pub trait SettingsStore: Send {
     /// Fails if the settings file cannot be written or lacks the preset.
     fn delete_preset(&mut self, name: &str) -> Result<(), String>;
 
-    /// Returns the command line of [`Services::command`].
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
+    /// Returns the command line of [`Services::format_command`].
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String;
 }

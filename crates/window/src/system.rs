@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::dialog;
-use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
+use super::services::{CliOption, FileChooser, OpenedSource, PathKind, Services, SettingsStore};
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::camera_control::CameraControl;
@@ -45,17 +45,17 @@ pub struct System {
     /// Sources opened so far, most recent first: they stay in the list even if they are no cameras.
     opened: Vec<Choice>,
     /// Camera name with the frame size and rate chosen for it.
-    mode: Option<(String, Size, f64)>,
+    chosen_mode: Option<(String, Size, f64)>,
     /// Device nodes at the last check, and whether that check found a change.
-    nodes: (Vec<String>, bool),
+    device_nodes: (Vec<String>, bool),
     /// Values of the driver controls set by the user, by name.
     control_values: BTreeMap<String, i64>,
     /// Device of the camera opened last, if it has driver controls.
     camera: Option<String>,
     /// Depth method that the user chose in the window.
-    way: Option<DepthMethod>,
+    depth_method: Option<DepthMethod>,
     /// Name of the source opened last with its default method, and the methods it supports itself.
-    own_ways: (String, Vec<DepthMethod>),
+    own_depth_methods: (String, Vec<DepthMethod>),
 }
 
 impl System {
@@ -69,12 +69,12 @@ impl System {
             force: false,
             settings,
             opened: Vec::new(),
-            mode: None,
-            nodes: (devices::list_video_nodes(), false),
+            chosen_mode: None,
+            device_nodes: (devices::list_video_nodes(), false),
             control_values: BTreeMap::new(),
             camera: None,
-            way: None,
-            own_ways: Default::default(),
+            depth_method: None,
+            own_depth_methods: Default::default(),
         }
     }
 
@@ -96,15 +96,15 @@ impl System {
     }
 
     /// Opens a source for continuous playback, with depth even if the current look does not need it.
-    fn open_source(&self, name: &str, way: Option<DepthMethod>) -> Result<(Source, SourceName), String> {
+    fn open_source(&self, name: &str, depth_method: Option<DepthMethod>) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| error.with_prefix(name).to_string())?;
         let mut options = self.options.clone();
-        if let Some(way) = way {
-            options.depth_choice = self.depth_choice_for(way);
+        if let Some(depth_method) = depth_method {
+            options.depth_choice = self.depth_choice_for(depth_method);
         }
         // Only recordings and photos end.
         options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
-        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
+        if let Some((_, size, fps)) = self.chosen_mode.as_ref().filter(|(camera, ..)| camera == name) {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
         // A later look may need depth; without metric settings, relative depth is accepted.
@@ -120,8 +120,8 @@ impl System {
     }
 
     /// Returns the depth choice of a method. Depth from elsewhere on the command line counts as the source's own.
-    fn depth_choice_for(&self, way: DepthMethod) -> DepthChoice {
-        match (way, &self.options.depth_choice) {
+    fn depth_choice_for(&self, depth_method: DepthMethod) -> DepthChoice {
+        match (depth_method, &self.options.depth_choice) {
             (DepthMethod::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
                 choice.clone()
             }
@@ -133,50 +133,57 @@ impl System {
                 ..SingleCameraDepth::default()
             }),
             (
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 choice @ DepthChoice::SingleCamera(SingleCameraDepth { mono: Some(_), matte: Some(_), .. }),
             ) => choice.clone(),
-            _ => way.choice(),
+            _ => depth_method.to_depth_choice(),
         }
     }
 
-    /// Returns the depth methods of a source opened with `way`, its own ones first.
-    fn ways(&mut self, source: &Source, name: &SourceName, way: Option<DepthMethod>) -> Vec<DepthMethod> {
+    /// Returns the depth methods of a source opened with `depth_method`, its own ones first.
+    fn list_depth_methods(
+        &mut self,
+        source: &Source,
+        name: &SourceName,
+        depth_method: Option<DepthMethod>,
+    ) -> Vec<DepthMethod> {
         let called = name.to_string();
-        if way.is_none() || self.own_ways.0 != called {
+        if depth_method.is_none() || self.own_depth_methods.0 != called {
             let mut own = Vec::new();
             match name {
                 // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
                     let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
-                    let has = |own: &mut Vec<DepthMethod>, is: bool, way: DepthMethod| own.extend(is.then_some(way));
+                    let has = |own: &mut Vec<DepthMethod>, is: bool, depth_method: DepthMethod| {
+                        own.extend(is.then_some(depth_method))
+                    };
                     has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), DepthMethod::Measured);
                     has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), DepthMethod::Stereo);
                 }
                 _ => own.extend(
-                    DepthMethod::of(source.depth_from, &SingleCameraDepth::default(), false)
-                        .filter(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo)),
+                    DepthMethod::from_origin(source.depth_from, &SingleCameraDepth::default(), false)
+                        .filter(|depth_method| matches!(depth_method, DepthMethod::Measured | DepthMethod::Stereo)),
                 ),
             }
-            self.own_ways = (called, own);
+            self.own_depth_methods = (called, own);
         }
-        let mut ways = self.own_ways.1.clone();
+        let mut depth_methods = self.own_depth_methods.1.clone();
         if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Photo) {
             let installed = source::installed_networks();
-            ways.extend(installed.matte.is_some().then_some(DepthMethod::Person));
-            ways.extend(
-                (installed.matte.is_some() && installed.mono.is_some()).then_some(DepthMethod::PersonAndDistance),
+            depth_methods.extend(installed.matte.is_some().then_some(DepthMethod::Person));
+            depth_methods.extend(
+                (installed.matte.is_some() && installed.mono.is_some()).then_some(DepthMethod::PersonAndMonoDepth),
             );
         }
         // A plate is for live cameras without depth of their own.
-        let is_alone = name.kind() == Kind::Camera && self.own_ways.1.is_empty();
-        ways.extend(is_alone.then_some(DepthMethod::Plate));
-        ways
+        let is_alone = name.kind() == Kind::Camera && self.own_depth_methods.1.is_empty();
+        depth_methods.extend(is_alone.then_some(DepthMethod::Plate));
+        depth_methods
     }
 }
 
 impl Services for System {
-    fn sources(&mut self) -> Vec<Choice> {
+    fn list_sources(&mut self) -> Vec<Choice> {
         let mut sources = devices::list_cameras();
         sources.extend(devices::list_pipewire_cameras());
         let is_other =
@@ -187,15 +194,15 @@ impl Services for System {
         sources
     }
 
-    fn virtual_cameras(&mut self) -> Vec<Choice> {
+    fn list_virtual_cameras(&mut self) -> Vec<Choice> {
         devices::list_virtual_cameras()
     }
 
-    fn check_depth_method(&mut self, name: &str, way: DepthMethod) -> Result<(), String> {
+    fn check_depth_method(&mut self, name: &str, depth_method: DepthMethod) -> Result<(), String> {
         let installed = source::installed_networks();
-        let lacks = match way {
+        let lacks = match depth_method {
             DepthMethod::Person => installed.matte.is_none(),
-            DepthMethod::PersonAndDistance => installed.matte.is_none() || installed.mono.is_none(),
+            DepthMethod::PersonAndMonoDepth => installed.matte.is_none() || installed.mono.is_none(),
             DepthMethod::Measured | DepthMethod::Stereo | DepthMethod::Plate => false,
         };
         if lacks {
@@ -203,10 +210,10 @@ impl Services for System {
         }
         // A recording can be opened twice to check it; a camera is busy.
         let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
-        if is_file { self.open_source(name, Some(way)).map(drop) } else { Ok(()) }
+        if is_file { self.open_source(name, Some(depth_method)).map(drop) } else { Ok(()) }
     }
 
-    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String> {
         let mut notes = Vec::new();
         let first_camera = || devices::list_cameras().into_iter().chain(devices::list_pipewire_cameras()).next();
         let name = match name {
@@ -219,9 +226,9 @@ impl Services for System {
             ),
             name => name.to_owned(),
         };
-        let (source, source_name) = self.open_source(&name, way)?;
+        let (source, source_name) = self.open_source(&name, depth_method)?;
         // Automatically used networks are not announced, because the user sees their effect.
-        let is_asked = matches!(self.options.depth_choice, DepthChoice::SingleCamera(_)) || way.is_some();
+        let is_asked = matches!(self.options.depth_choice, DepthChoice::SingleCamera(_)) || depth_method.is_some();
         notes.extend(source.networks.iter().filter(|_| is_asked).map(|networks| format!("Depth by {networks}.")));
         for by in source.networks.iter().chain(&source.persons) {
             tracing::info!("{name}: persons by {by}");
@@ -229,7 +236,7 @@ impl Services for System {
         if source_name.kind() == Kind::Synthetic {
             notes.push(RENDERED.to_owned());
         }
-        let is_declined = self.options.depth_choice == DepthChoice::None && way.is_none();
+        let is_declined = self.options.depth_choice == DepthChoice::None && depth_method.is_none();
         if is_declined && source.has_depth() {
             notes.push(DECLINED.to_owned());
         }
@@ -240,28 +247,28 @@ impl Services for System {
         self.opened.insert(0, Choice::from_name(&name));
         self.camera = devices::controllable_camera(&source_name);
         let controls = self.camera.as_deref().map(devices::list_controls).unwrap_or_default();
-        self.way = way;
+        self.depth_method = depth_method;
         let camera = self.camera_properties(&source, &source_name);
-        let mut ways = self.ways(&source, &source_name, way);
+        let mut depth_methods = self.list_depth_methods(&source, &source_name, depth_method);
         let networks = match &self.options.depth_choice {
             DepthChoice::SingleCamera(chosen) if chosen.has_networks() => chosen.clone(),
             _ => source::installed_networks(),
         };
-        let usual = || DepthMethod::of(source.depth_from, &networks, source.guide.is_some());
-        let way = way.or_else(usual).filter(|_| has_depth);
-        ways.extend(way.filter(|way| !ways.contains(way)));
-        Ok(Opened { name, source, has_depth, ways, way, notes, controls, camera })
+        let usual = || DepthMethod::from_origin(source.depth_from, &networks, source.guide.is_some());
+        let depth_method = depth_method.or_else(usual).filter(|_| has_depth);
+        depth_methods.extend(depth_method.filter(|depth_method| !depth_methods.contains(depth_method)));
+        Ok(OpenedSource { name, source, has_depth, depth_methods, depth_method, notes, controls, camera })
     }
 
-    fn devices_changed(&mut self) -> bool {
+    fn have_devices_changed(&mut self) -> bool {
         let nodes = devices::list_video_nodes();
-        let differ = nodes != self.nodes.0;
+        let differ = nodes != self.device_nodes.0;
         // Reports the change once more at the next check: a new node exists before its access rights are set.
-        let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
+        let again = std::mem::replace(&mut self.device_nodes, (nodes, differ)).1;
         differ || again
     }
 
-    fn check(&self, name: &str) -> Result<(), String> {
+    fn check_source_name(&self, name: &str) -> Result<(), String> {
         let source_name = SourceName::from_str(name).map_err(|error| error.with_prefix(name).to_string())?;
         match &source_name {
             SourceName::Folder(folder) => {
@@ -272,26 +279,26 @@ impl Services for System {
         }
     }
 
-    fn browse(&self, what: Browse) -> Pick {
-        Box::new(move || dialog::pick(what))
+    fn create_file_chooser(&self, kind: PathKind) -> FileChooser {
+        Box::new(move || dialog::choose_path(kind))
     }
 
-    fn choose_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {
-        self.mode = Some((name.to_owned(), Size { width, height }, fps));
+    fn set_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {
+        self.chosen_mode = Some((name.to_owned(), Size { width, height }, fps));
     }
 
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String> {
+    fn set_control(&mut self, control: &str, value: i64) -> Result<Vec<CameraControl>, String> {
         let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
-        let controls = devices::set_control(camera, knob, value)?;
-        self.control_values.insert(knob.to_owned(), value);
+        let controls = devices::set_control(camera, control, value)?;
+        self.control_values.insert(control.to_owned(), value);
         Ok(controls)
     }
 
-    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+    fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.executors.create_blur(settings, size).map_err(|error| error.to_string())
     }
 
-    fn output(
+    fn open_output(
         &mut self,
         name: &str,
         size: (u32, u32),
@@ -305,7 +312,7 @@ impl Services for System {
         target.open(&options).map_err(|error| error.to_string())
     }
 
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
         let mut switches = match outputs {
             [] => switches.to_vec(),
             // A command that writes to outputs has no window options.
@@ -316,14 +323,14 @@ impl Services for System {
                 self.control_values.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
         }
-        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == source) {
+        if let Some((_, size, fps)) = self.chosen_mode.as_ref().filter(|(camera, ..)| camera == source) {
             switches.push(("size".into(), format!("{}x{}", size.width, size.height)));
             switches.push(("fps".into(), format!("{}", (fps * 1000.0).round() / 1000.0)));
         }
-        if let Some(way) = self.way {
-            switches.push(("depth".into(), way.flag()));
+        if let Some(depth_method) = self.depth_method {
+            switches.push(("depth".into(), depth_method.depth_option()));
         }
-        self.settings.command(look, source, outputs, &switches)
+        self.settings.format_command(look, source, outputs, &switches)
     }
 
     fn settings(&mut self) -> &mut dyn SettingsStore {

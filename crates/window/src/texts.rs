@@ -20,7 +20,7 @@ thread_local! {
 }
 
 /// Sets this thread's translation; call once, because the table is leaked.
-pub fn speak(table: Table) {
+pub fn set_translation(table: Table) {
     TABLE.set(Some(Box::leak(Box::new(table))));
 }
 
@@ -46,7 +46,7 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
 
 /// Translates a complete sentence, matching table entries with the placeholders `{}` or `{name}` and inserting the
 /// values into the translation. Names and error reasons are not in the table and stay unchanged.
-pub fn translated(sentence: &str) -> String {
+pub fn translate_sentence(sentence: &str) -> String {
     let table = TABLE.get().into_iter().flatten();
     // Of several matching entries, the longest is the most specific.
     let said = table.filter(|(_, text)| !text.is_empty()).filter_map(|(english, text)| match english == sentence {
@@ -92,13 +92,14 @@ fn fill_placeholders(text: &str, values: &[(&str, &str)]) -> String {
 ///
 /// # Errors
 /// Returns a one-line message if there is no such translation, or it cannot be read.
-pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
+pub fn load_translation(language: Option<&str>) -> Result<Option<Table>, String> {
     let Some(name) = language else {
         let Some(language) = environment_language() else { return Ok(None) };
         // The environment's language was not requested explicitly, so errors fall back to English.
-        let own = find(&language)
-            .and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok());
-        return Ok(own.or_else(|| built_in(&language)));
+        let own = find_translation(&language).and_then(|path| {
+            read_translation(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok()
+        });
+        return Ok(own.or_else(|| load_built_in(&language)));
     };
     if ["en", "C", "POSIX"].contains(&name) {
         return Ok(None);
@@ -109,14 +110,14 @@ pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
             "there is no translation '{name}': save one as ~/.local/share/bokehcam/texts/{name}.toml, or give a file"
         )
     };
-    match is_file.or_else(|| find(name)) {
-        Some(path) => read(&path).map(Some),
-        None => built_in(name).ok_or_else(none).map(Some),
+    match is_file.or_else(|| find_translation(name)) {
+        Some(path) => read_translation(&path).map(Some),
+        None => load_built_in(name).ok_or_else(none).map(Some),
     }
 }
 
 /// Returns the built-in translation into a language such as `de_AT.UTF-8` or `de`. A user's file has precedence.
-pub fn built_in(language: &str) -> Option<Table> {
+pub fn load_built_in(language: &str) -> Option<Table> {
     let short = language.split(['.', '@', '_']).next()?;
     let text = match short {
         "de" => include_str!("texts/de.toml"),
@@ -129,7 +130,7 @@ pub fn built_in(language: &str) -> Option<Table> {
 ///
 /// # Errors
 /// Returns a one-line message if it cannot be read or is no list of texts.
-fn read(path: &Path) -> Result<Table, String> {
+fn read_translation(path: &Path) -> Result<Table, String> {
     let at = |what: &dyn Display| format!("{}: {what}", path.display()).replace('\n', ", ");
     let text = input::read_text(path, input::MAX_SETTINGS_BYTES).map_err(|error| at(&error))?;
     toml::from_str(&text).map_err(|error: toml::de::Error| at(&error.message()))
@@ -137,8 +138,8 @@ fn read(path: &Path) -> Result<Table, String> {
 
 /// Finds the file of a translation into `language`, such as `de_AT` or `de`, in the XDG data folders; `None` if no file
 /// exists, as for English.
-fn find(language: &str) -> Option<PathBuf> {
-    let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
+fn find_translation(language: &str) -> Option<PathBuf> {
+    let language = language.split(['.', '@']).next().filter(|name| is_language_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
     let folders: Vec<PathBuf> = data::own().into_iter().chain(data::system()).collect();
     let named = |name: &str| {
@@ -154,7 +155,7 @@ fn environment_language() -> Option<String> {
 }
 
 /// Whether this is a language name and not a path.
-fn is_name(name: &str) -> bool {
+fn is_language_name(name: &str) -> bool {
     !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
 }
 
@@ -166,27 +167,27 @@ pub mod tests {
     use super::*;
 
     thread_local! {
-        static SEEN: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
+        static RECORDED: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
     }
 
     pub fn record_text(text: &str) {
-        SEEN.with_borrow_mut(|seen| seen.insert(text.to_owned()));
+        RECORDED.with_borrow_mut(|seen| seen.insert(text.to_owned()));
     }
 
     /// Returns the texts requested on this thread.
-    pub fn seen() -> BTreeSet<String> {
-        SEEN.with_borrow(Clone::clone)
+    pub fn recorded_texts() -> BTreeSet<String> {
+        RECORDED.with_borrow(Clone::clone)
     }
 
     /// Returns the template for translators.
-    pub fn english() -> Table {
+    pub fn english_table() -> Table {
         toml::from_str(include_str!("texts.toml")).unwrap()
     }
 
     #[test]
     fn a_text_is_translated_and_one_without_translation_stays() {
         assert_eq!(tr("Mirror"), "Mirror");
-        speak(
+        set_translation(
             [("Mirror", "Spiegel"), ("{} of {}", "von {} {}"), ("Depth", "")].map(|(a, b)| (a.into(), b.into())).into(),
         );
         assert_eq!([tr("Mirror"), tr("Depth"), tr("Focus")], ["Spiegel", "Depth", "Focus"]);
@@ -196,7 +197,7 @@ pub mod tests {
 
     #[test]
     fn sentences_with_values_are_translated_and_those_of_others_stay() {
-        speak(
+        set_translation(
             [
                 ("Saved {}", "{} ist gesichert"),
                 ("Saved as preset '{name}'", "Als Vorlage „{name}“ gesichert"),
@@ -216,7 +217,7 @@ pub mod tests {
             ("Preset 'a' is called 'b' no", "Preset 'a' is called 'b' no"),
             ("", ""),
         ] {
-            assert_eq!(translated(english), german);
+            assert_eq!(translate_sentence(english), german);
         }
     }
 
@@ -225,16 +226,16 @@ pub mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("xx.toml");
         std::fs::write(&path, "\"Mirror\" = \"Spiegel\"\n").unwrap();
-        assert_eq!(read(&path).unwrap()["Mirror"], "Spiegel");
+        assert_eq!(read_translation(&path).unwrap()["Mirror"], "Spiegel");
         std::fs::write(&path, "Mirror = 3\n").unwrap();
-        let line = read(&path).unwrap_err();
+        let line = read_translation(&path).unwrap_err();
         assert!(line.contains("xx.toml: ") && !line.contains('\n'), "{line}");
-        assert!(read(&folder.path().join("none.toml")).is_err());
+        assert!(read_translation(&folder.path().join("none.toml")).is_err());
         for odd in ["", "../etc", "C.UTF-8", "zz_ZZ"] {
-            assert_eq!(find(odd), None, "{odd}");
+            assert_eq!(find_translation(odd), None, "{odd}");
         }
-        assert_eq!(chosen(Some("en")), Ok(None));
-        assert!(chosen(Some("zz")).unwrap_err().contains("no translation 'zz'"));
-        assert!(chosen(Some("/nowhere/zz.toml")).unwrap_err().contains("/nowhere/zz.toml: "));
+        assert_eq!(load_translation(Some("en")), Ok(None));
+        assert!(load_translation(Some("zz")).unwrap_err().contains("no translation 'zz'"));
+        assert!(load_translation(Some("/nowhere/zz.toml")).unwrap_err().contains("/nowhere/zz.toml: "));
     }
 }

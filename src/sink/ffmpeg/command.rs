@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::container::Container;
-use super::process::output_within;
+use super::process::read_output_within;
 use crate::color::YcbcrMatrix;
 
 const PROGRAM: &str = "ffmpeg";
@@ -29,7 +29,7 @@ impl Format {
         match extension.as_deref() {
             Some("webm") => matroska(&["-cluster_time_limit", "1000", "-f", "webm"], VP9),
             Some("mkv") => matroska(&["-cluster_time_limit", "1000", "-f", "matroska"], H264),
-            _ => Self { container: Container::Mp4, muxer: FRAGMENTS, encoder: H264, time_base: MP4_TIME_BASE },
+            _ => Self { container: Container::Mp4, muxer: FRAGMENTED_MP4, encoder: H264, time_base: MP4_TIME_BASE },
         }
     }
 }
@@ -38,7 +38,7 @@ impl Format {
 /// distrust longer ones.
 const MP4_TIME_BASE: &str = "1:6000";
 
-const FRAGMENTS: &[&str] =
+const FRAGMENTED_MP4: &[&str] =
     &["-movflags", "+frag_keyframe+delay_moov+default_base_moof", "-frag_duration", "1000000", "-f", "mp4"];
 
 /// Visually lossless, at several times the speed of the default preset.
@@ -49,7 +49,7 @@ const VP9: &[&str] =
 
 /// Builds the command that encodes the Matroska stream on its standard input into the file `part`, with `threads`
 /// threads.
-pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<usize>) -> Command {
+pub(super) fn encode_command(format: &Format, part: &Path, height: u32, threads: Option<usize>) -> Command {
     let color = match YcbcrMatrix::for_height(height) {
         YcbcrMatrix::Bt601 => "smpte170m",
         // Players expect this for high definition.
@@ -71,16 +71,20 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<
         // No random identifiers: the same frames produce the same file.
         .args(["-fflags", "+bitexact", "-flush_packets", "1"])
         .args(format.muxer)
-        .arg(as_file(part))
+        .arg(file_url(part))
         .stdin(Stdio::piped());
     command
 }
 
 /// Builds the command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before
 /// it has the whole file.
-pub(super) fn index_in_front(from: &Path, to: &Path) -> Command {
+pub(super) fn faststart_command(from: &Path, to: &Path) -> Command {
     let mut command = base_command();
-    command.arg("-i").arg(as_file(from)).args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"]).arg(as_file(to));
+    command
+        .arg("-i")
+        .arg(file_url(from))
+        .args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"])
+        .arg(file_url(to));
     command.stdin(Stdio::null());
     command
 }
@@ -98,7 +102,7 @@ fn base_command() -> Command {
 }
 
 /// Prefixes the path as a file, so that ffmpeg interprets neither a dash as an option nor a colon as a protocol.
-fn as_file(path: &Path) -> OsString {
+fn file_url(path: &Path) -> OsString {
     let mut name = OsString::from("file:");
     name.push(path);
     name
@@ -107,13 +111,13 @@ fn as_file(path: &Path) -> OsString {
 /// Returns the name of the option by which frames keep their times: `-fps_mode` since ffmpeg 5.1, `-vsync` before,
 /// which later versions no longer support.
 fn frame_timing_option() -> &'static str {
-    let said = output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
-    if said.as_deref().and_then(version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }
+    let text = read_output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
+    if text.as_deref().and_then(parse_version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }
 }
 
 /// Parses `ffmpeg version 5.1.9-0+deb12u1 Copyright ...` to (5, 1).
-fn version(said: &str) -> Option<(u32, u32)> {
-    let number = said.strip_prefix("ffmpeg version ")?.split_whitespace().next()?.trim_start_matches('n');
+fn parse_version(text: &str) -> Option<(u32, u32)> {
+    let number = text.strip_prefix("ffmpeg version ")?.split_whitespace().next()?.trim_start_matches('n');
     let mut parts = number.split(|c: char| !c.is_ascii_digit());
     Some((parts.next()?.parse().ok()?, parts.next().and_then(|minor| minor.parse().ok()).unwrap_or(0)))
 }
@@ -124,7 +128,7 @@ mod tests {
 
     #[test]
     fn versions_are_read_as_builds_state_them() {
-        for (said, expected) in [
+        for (text, expected) in [
             ("ffmpeg version 5.1.9-0+deb12u1 Copyright (c) 2000-2026", Some((5, 1))),
             ("ffmpeg version n6.0-10-g1 Copyright", Some((6, 0))),
             ("ffmpeg version 4.4.2-0ubuntu0.22.04.1 Copyright", Some((4, 4))),
@@ -133,7 +137,7 @@ mod tests {
             ("ffmpeg version N-109542-g0a7c6b4 Copyright", None),
             ("something else", None),
         ] {
-            assert_eq!(version(said), expected, "{said}");
+            assert_eq!(parse_version(text), expected, "{text}");
         }
     }
 }

@@ -16,9 +16,9 @@ use std::time::Duration;
 
 use self::command::Format;
 use self::container::Container;
-use self::process::{Ended, Process};
+use self::process::{Process, ProcessEnd};
 use self::raw::RawVideo;
-use super::output::Output;
+use super::output::OutputFile;
 use super::pipe::Pipe;
 use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::files::whole::Part;
@@ -33,7 +33,7 @@ pub struct Ffmpeg {
     input: Option<RawVideo<Pipe>>,
     process: Process,
     format: Format,
-    output: Output,
+    output: OutputFile,
     size: (u32, u32),
     stop: Arc<AtomicBool>,
 }
@@ -45,29 +45,29 @@ impl Ffmpeg {
     /// # Errors
     /// The file exists and `force` is not set, or ffmpeg is missing or cannot be started.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
-        let output = Output::create(path, options.force)?;
+        let output = OutputFile::create(path, options.force)?;
         let format = Format::for_path(path);
-        let mut command = command::encode(&format, output.part(), options.size.1, options.threads);
+        let mut command = command::encode_command(&format, output.part_path(), options.size.1, options.threads);
         let mut process = Process::start(&mut command, &options.stop).map_err(|cause| match cause.kind() {
             ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
             _ => SinkError::Write { path: path.to_owned(), cause },
         })?;
         let mut watchdog = process.watchdog();
         let pipe = match process.stdin() {
-            Some(stdin) => Pipe::from_owned(OwnedFd::from(stdin), move |blocked| !watchdog.hangs(blocked)),
+            Some(stdin) => Pipe::from_owned(OwnedFd::from(stdin), move |blocked| !watchdog.is_hung(blocked)),
             None => Err(ErrorKind::BrokenPipe.into()),
         };
         let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns));
         let input = input.map_err(SinkError::write(path))?;
-        input.to.wait_drained(STARTUP_TIMEOUT).map_err(SinkError::write(path))?;
+        input.writer.wait_drained(STARTUP_TIMEOUT).map_err(SinkError::write(path))?;
         Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
     }
 
-    /// Closes the input of ffmpeg and waits for its end, or kills it if it `hangs`; then checks its file.
-    fn end(&mut self, hangs: bool) -> Result<(), SinkError> {
+    /// Closes the input of ffmpeg and waits for its end, or kills it if it `is_hung`; then checks its file.
+    fn finish_encoding(&mut self, is_hung: bool) -> Result<(), SinkError> {
         self.input = None;
-        let ended = if hangs { Ok(self.process.end_hung()) } else { self.process.wait() };
-        check_outcome(ended, self.output.path(), self.output.part(), self.format.container)
+        let ended = if is_hung { Ok(self.process.kill_hung()) } else { self.process.wait() };
+        check_outcome(ended, self.output.path(), self.output.part_path(), self.format.container)
     }
 
     /// Copies an mp4 to one with its index at the front. If that fails, for example on a full disk, the file stays as
@@ -77,38 +77,45 @@ impl Ffmpeg {
             return;
         }
         let indexed = Part::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
-            let command = command::index_in_front(self.output.part(), part.part());
-            run(command, &self.stop, self.output.path(), part.part()).map(|()| part)
+            let command = command::faststart_command(self.output.part_path(), part.part());
+            run_ffmpeg(command, &self.stop, self.output.path(), part.part()).map(|()| part)
         });
         match indexed {
-            Ok(part) => self.output.replace(part),
+            Ok(part) => self.output.replace_part(part),
             Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),
         }
     }
 }
 
 /// Runs ffmpeg to write `part`, which must then be a complete mp4.
-fn run(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
+fn run_ffmpeg(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
     let ended = Process::start(&mut command, stop).and_then(|mut process| process.wait());
     check_outcome(ended, path, part, Container::Mp4)
 }
 
 /// Messages of ffmpeg about frames missing from a file, though its exit status may be success.
-const LOSSES: [&str; 5] =
+const LOSS_MESSAGES: [&str; 5] =
     ["av_interleaved_write_frame", "Error writing", "Error muxing", "No space left", "Input/output error"];
 
 /// Fails unless ffmpeg succeeded, reported no losses, and left a complete file at `part`. `path` is for the message.
-fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
-    let Ended { status, said } = ended.map_err(SinkError::write(path))?;
+fn check_outcome(
+    ended: io::Result<ProcessEnd>,
+    path: &Path,
+    part: &Path,
+    container: Container,
+) -> Result<(), SinkError> {
+    let ProcessEnd { status, stderr } = ended.map_err(SinkError::write(path))?;
     let path = path.to_owned();
-    let failed = |status: &str| match said.contains("No space left on device") {
+    let failed = |status: &str| match stderr.contains("No space left on device") {
         true => SinkError::Full { path: path.clone() },
-        false => SinkError::Ffmpeg { path: path.clone(), status: status.into(), said: said.clone() },
+        false => SinkError::Ffmpeg { path: path.clone(), status: status.into(), stderr: stderr.clone() },
     };
     match status {
         None => return Err(failed("it hung, and was killed")),
         Some(status) if !status.success() => return Err(failed(&status.to_string())),
-        Some(_) if LOSSES.iter().any(|loss| said.contains(loss)) => return Err(failed("frames are missing")),
+        Some(_) if LOSS_MESSAGES.iter().any(|message| stderr.contains(message)) => {
+            return Err(failed("frames are missing"));
+        }
         Some(_) => {}
     }
     match container.check(part).map_err(SinkError::write(&path))? {
@@ -118,25 +125,27 @@ fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: 
 }
 
 impl Sink for Ffmpeg {
-    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.size, frame.size())?;
         let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
         if let Err(error) = self.output.check_exists() {
             // It still completes the file, which can be copied; its result adds no information.
-            let _ = self.end(false);
+            let _ = self.finish_encoding(false);
             return Err(self.output.fail(error));
         }
-        let Err(cause) = input.write(frame, time_ns) else {
+        let Err(cause) = input.write_frame(frame, time_ns) else {
             self.output.frames += 1;
             return Ok(ControlFlow::Continue(()));
         };
         let path = self.output.path().to_owned();
         let error = match cause.kind() {
             // ffmpeg closes its input only by exiting: its exit status is more informative than the broken pipe.
-            ErrorKind::BrokenPipe | ErrorKind::TimedOut => match self.end(cause.kind() == ErrorKind::TimedOut) {
-                Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), said: String::new() },
-                Err(error) => error,
-            },
+            ErrorKind::BrokenPipe | ErrorKind::TimedOut => {
+                match self.finish_encoding(cause.kind() == ErrorKind::TimedOut) {
+                    Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), stderr: String::new() },
+                    Err(error) => error,
+                }
+            }
             _ => SinkError::Write { path, cause },
         };
         Err(self.output.fail(error))
@@ -151,7 +160,7 @@ impl Sink for Ffmpeg {
             self.output.discard();
             return Ok(());
         }
-        let ended = self.end(false);
+        let ended = self.finish_encoding(false);
         match self.output.check_exists().and(ended) {
             Ok(()) => {
                 self.move_index_to_front();

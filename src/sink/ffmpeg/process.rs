@@ -15,7 +15,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 use crate::sink::pipe::STOP_TIMEOUT;
 
 /// Number of error lines that are kept: the cause comes last, but not always alone.
-const LAST_LINES: usize = 4;
+const MAX_STDERR_LINES: usize = 4;
 /// A process that is idle for this long although it has work counts as hung; [`STOP_TIMEOUT`] once the run has to
 /// stop.
 const HANG_TIMEOUT: Duration = Duration::from_secs(10);
@@ -26,28 +26,30 @@ const TICK: Duration = Duration::from_millis(10);
 pub(super) struct Process {
     child: Child,
     /// Its last lines on standard error, sent once it has closed that.
-    said: Receiver<VecDeque<String>>,
+    stderr: Receiver<VecDeque<String>>,
     stop: Arc<AtomicBool>,
 }
 
 /// How a process ended.
-pub(super) struct Ended {
+pub(super) struct ProcessEnd {
     /// `None` for a process that hung and was killed.
     pub status: Option<ExitStatus>,
     /// Its last error lines, joined by ` | `.
-    pub said: String,
+    pub stderr: String,
 }
 
 impl Process {
     /// Starts a command whose standard error is piped. `stop` is set once the run has to stop.
     pub(super) fn start(command: &mut Command, stop: &Arc<AtomicBool>) -> io::Result<Self> {
         let mut child = command.spawn()?;
-        let (to, said) = mpsc::channel();
+        let (stderr_sender, stderr) = mpsc::channel();
         // Read continuously: a process that fills the pipe would block, and this program with it.
         let reader = child.stderr.take().map(|stderr| {
-            thread::Builder::new().name("ffmpeg".into()).spawn(move || drop(to.send(last_lines(stderr))))
+            thread::Builder::new()
+                .name("ffmpeg".into())
+                .spawn(move || drop(stderr_sender.send(read_last_lines(stderr))))
         });
-        let process = Self { child, said, stop: Arc::clone(stop) };
+        let process = Self { child, stderr, stop: Arc::clone(stop) };
         reader.transpose().map(|_| process)
     }
 
@@ -56,33 +58,33 @@ impl Process {
     }
 
     pub(super) fn watchdog(&self) -> Watchdog {
-        Watchdog { pid: self.child.id(), stop: Arc::clone(&self.stop), used: None, worked_at: Instant::now() }
+        Watchdog { pid: self.child.id(), stop: Arc::clone(&self.stop), cpu_ticks: None, last_active_at: Instant::now() }
     }
 
     /// Waits until it ends; kills it if it hangs.
-    pub(super) fn wait(&mut self) -> io::Result<Ended> {
+    pub(super) fn wait(&mut self) -> io::Result<ProcessEnd> {
         let (started, mut watchdog) = (Instant::now(), self.watchdog());
         let status = loop {
             if let Some(status) = self.child.try_wait()? {
                 break Some(status);
             }
-            if watchdog.hangs(started.elapsed()) {
-                return Ok(self.end_hung());
+            if watchdog.is_hung(started.elapsed()) {
+                return Ok(self.kill_hung());
             }
             thread::sleep(TICK);
         };
-        Ok(Ended { status, said: self.said() })
+        Ok(ProcessEnd { status, stderr: self.last_stderr() })
     }
 
     /// Kills the hung process.
-    pub(super) fn end_hung(&mut self) -> Ended {
+    pub(super) fn kill_hung(&mut self) -> ProcessEnd {
         self.kill();
-        Ended { status: None, said: self.said() }
+        ProcessEnd { status: None, stderr: self.last_stderr() }
     }
 
-    fn said(&self) -> String {
+    fn last_stderr(&self) -> String {
         // A child process of it may keep standard error open for longer.
-        Vec::from(self.said.recv_timeout(STOP_TIMEOUT / 2).unwrap_or_default()).join(" | ")
+        Vec::from(self.stderr.recv_timeout(STOP_TIMEOUT / 2).unwrap_or_default()).join(" | ")
     }
 
     fn kill(&mut self) {
@@ -109,21 +111,21 @@ impl Drop for Process {
 pub(super) struct Watchdog {
     pid: u32,
     stop: Arc<AtomicBool>,
-    /// Processor time used, in ticks, when it was last seen to work.
-    used: Option<u64>,
-    worked_at: Instant,
+    /// Processor time used when it was last seen to work.
+    cpu_ticks: Option<u64>,
+    last_active_at: Instant,
 }
 
 impl Watchdog {
     /// Whether it has been idle for too long, where the caller has waited for it for `waited`.
-    pub(super) fn hangs(&mut self, waited: Duration) -> bool {
-        let (is_working, used) = read_activity(self.pid);
-        if is_working || used != self.used {
-            (self.used, self.worked_at) = (used, Instant::now());
+    pub(super) fn is_hung(&mut self, waited: Duration) -> bool {
+        let (is_active, cpu_ticks) = read_activity(self.pid);
+        if is_active || cpu_ticks != self.cpu_ticks {
+            (self.cpu_ticks, self.last_active_at) = (cpu_ticks, Instant::now());
         }
         let timeout = if self.stop.load(Ordering::Relaxed) { STOP_TIMEOUT } else { HANG_TIMEOUT };
         // It may have been idle before because it had no work.
-        waited.min(self.worked_at.elapsed()) >= timeout
+        waited.min(self.last_active_at.elapsed()) >= timeout
     }
 }
 
@@ -132,20 +134,20 @@ fn read_activity(pid: u32) -> (bool, Option<u64>) {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     // The name, in brackets, may contain any characters.
     let mut fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields).split_whitespace();
-    let is_working = matches!(fields.next(), Some("R" | "D"));
+    let is_active = matches!(fields.next(), Some("R" | "D"));
     let mut number = |at| fields.nth(at).and_then(|field| field.parse::<u64>().ok());
     // proc(5): utime and stime are the 14th and 15th, the state is the third.
-    (is_working, number(10).zip(number(0)).map(|(user, system)| user + system))
+    (is_active, number(10).zip(number(0)).map(|(user, system)| user + system))
 }
 
-fn last_lines(stderr: impl Read) -> VecDeque<String> {
-    let mut lines = VecDeque::with_capacity(LAST_LINES + 1);
+fn read_last_lines(stderr: impl Read) -> VecDeque<String> {
+    let mut lines = VecDeque::with_capacity(MAX_STDERR_LINES + 1);
     for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
         let line = String::from_utf8_lossy(&line).trim().to_owned();
         if !line.is_empty() {
             lines.push_back(line);
         }
-        if lines.len() > LAST_LINES {
+        if lines.len() > MAX_STDERR_LINES {
             lines.pop_front();
         }
     }
@@ -153,19 +155,19 @@ fn last_lines(stderr: impl Read) -> VecDeque<String> {
 }
 
 /// Returns a program's standard output, if it ends in time.
-pub(super) fn output_within(command: &mut Command, timeout: Duration) -> Option<String> {
+pub(super) fn read_output_within(command: &mut Command, timeout: Duration) -> Option<String> {
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
     let mut stdout = child.stdout.take()?;
-    let (to, said) = mpsc::channel();
+    let (output_sender, output) = mpsc::channel();
     let read = move || {
         let mut text = Vec::new();
         // The receiver may have timed out.
-        let _ = stdout.read_to_end(&mut text).map(|_| to.send(text));
+        let _ = stdout.read_to_end(&mut text).map(|_| output_sender.send(text));
     };
     thread::Builder::new().name("ffmpeg".into()).spawn(read).ok()?;
-    let said = said.recv_timeout(timeout);
+    let output = output.recv_timeout(timeout);
     // Either it has closed its output and is done, or it took too long.
     let _ = child.kill();
     let _ = child.wait();
-    String::from_utf8(said.ok()?).ok()
+    String::from_utf8(output.ok()?).ok()
 }

@@ -16,7 +16,7 @@ const MIN_TICKS: u64 = 1000;
 
 /// A stream of raw frames.
 pub(super) struct RawVideo<W: Write> {
-    pub(super) to: W,
+    pub(super) writer: W,
     converter: Converter,
     /// Time of the first frame.
     first_ns: Option<u64>,
@@ -27,12 +27,12 @@ pub(super) struct RawVideo<W: Write> {
 }
 
 impl<W: Write> RawVideo<W> {
-    /// Creates a stream into `to` of frames of `size` that usually come every `period_ns`. Writes its header at once.
-    pub(super) fn new(mut to: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
+    /// Creates a stream into `writer` of frames of `size` that usually come every `period_ns`. Writes its header at once.
+    pub(super) fn new(mut writer: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
         let matrix = YcbcrMatrix::for_height(size.1);
-        to.write_all(&header(size, period_ns, matrix))?;
+        writer.write_all(&encode_header(size, period_ns, matrix))?;
         Ok(Self {
-            to,
+            writer,
             converter: Converter::new(matrix, Range::Limited),
             first_ns: None,
             last_ticks: None,
@@ -41,14 +41,14 @@ impl<W: Write> RawVideo<W> {
     }
 
     /// Writes a frame captured at `time_ns`, as a cluster of its own.
-    pub(super) fn write(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
+    pub(super) fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
         let ticks = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
         let ticks = self.last_ticks.map_or(ticks, |last| ticks.max(last + MIN_TICKS));
         self.last_ticks = Some(ticks);
         let (width, height) = (frame.width as usize, frame.height as usize);
         let picture_bytes = width * height + 2 * width.div_ceil(2) * height.div_ceil(2);
-        let time = element(TIMESTAMP, &ticks.to_be_bytes());
+        let time = encode_element(TIMESTAMP, &ticks.to_be_bytes());
         // Track 1, at the time of the cluster, a key frame.
         let block_head = [0x81, 0, 0, 0x80];
         let block_bytes = block_head.len() + picture_bytes;
@@ -56,8 +56,8 @@ impl<W: Write> RawVideo<W> {
         self.bytes.extend_from_slice(&time);
         append_element_head(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
         self.bytes.extend_from_slice(&block_head);
-        self.converter.append(frame, &mut self.bytes);
-        let written = self.to.write_all(&self.bytes);
+        self.converter.append_planes(frame, &mut self.bytes);
+        let written = self.writer.write_all(&self.bytes);
         self.bytes.clear();
         written
     }
@@ -77,7 +77,7 @@ fn append_element_head(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
     to.extend_from_slice(&(bytes as u64 | 1 << 56).to_be_bytes());
 }
 
-fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
+fn encode_element(id: &[u8], content: &[u8]) -> Vec<u8> {
     let mut element = Vec::with_capacity(id.len() + SIZE_BYTES + content.len());
     append_element_head(id, content.len(), &mut element);
     element.extend_from_slice(content);
@@ -86,9 +86,9 @@ fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
 
 /// Builds everything before the first cluster: the EBML header, and the head of an endless segment with its info and
 /// one track.
-fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> Vec<u8> {
-    let number = |id: &[u8], value: u64| element(id, &value.to_be_bytes());
-    let master_element = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
+fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> Vec<u8> {
+    let number = |id: &[u8], value: u64| encode_element(id, &value.to_be_bytes());
+    let master_element = |id: &[u8], parts: &[Vec<u8>]| encode_element(id, &parts.concat());
     // Codes of ITU-T H.273.
     let color = match matrix {
         YcbcrMatrix::Bt601 => 6,
@@ -110,7 +110,12 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> V
     // Width, height, pixel layout.
     let video = master_element(
         &[0xe0],
-        &[number(&[0xb0], width.into()), number(&[0xba], height.into()), element(&[0x2e, 0xb5, 0x24], b"I420"), colour],
+        &[
+            number(&[0xb0], width.into()),
+            number(&[0xba], height.into()),
+            encode_element(&[0x2e, 0xb5, 0x24], b"I420"),
+            colour,
+        ],
     );
     let track = master_element(
         &[0xae],
@@ -122,7 +127,7 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> V
             number(&[0x83], 1),
             number(&[0x9c], 0),
             // Codec and frame period.
-            element(&[0x86], b"V_UNCOMPRESSED"),
+            encode_element(&[0x86], b"V_UNCOMPRESSED"),
             number(&[0x23, 0xe3, 0x83], period_ns),
             video,
         ],
@@ -135,7 +140,7 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> V
             number(&[0x42, 0xf7], 1),
             number(&[0x42, 0xf2], 4),
             number(&[0x42, 0xf3], 8),
-            element(&[0x42, 0x82], b"matroska"),
+            encode_element(&[0x42, 0x82], b"matroska"),
             number(&[0x42, 0x87], 4),
             number(&[0x42, 0x85], 2),
         ],
@@ -143,11 +148,11 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> V
     header.extend_from_slice(SEGMENT);
     header.extend_from_slice(&UNKNOWN_SIZE);
     // Info: the length of a tick, the muxing and the writing program.
-    let app_name = |id: &[u8]| element(id, b"bokehcam");
+    let app_name = |id: &[u8]| encode_element(id, b"bokehcam");
     header.extend(master_element(
         &[0x15, 0x49, 0xa9, 0x66],
         &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), app_name(&[0x4d, 0x80]), app_name(&[0x57, 0x41])],
     ));
-    header.extend(element(&[0x16, 0x54, 0xae, 0x6b], &track));
+    header.extend(encode_element(&[0x16, 0x54, 0xae, 0x6b], &track));
     header
 }

@@ -35,12 +35,12 @@ impl Encoder {
             }
             Layout::Yu12 => {
                 bytes.clear();
-                self.planar.append(picture, bytes);
+                self.planar.append_planes(picture, bytes);
             }
             Layout::Nv12 => {
                 // NV12 is planar 4:2:0 with the two chroma planes interleaved.
                 self.planes.clear();
-                self.planar.append(picture, &mut self.planes);
+                self.planar.append_planes(picture, &mut self.planes);
                 let (luma, chroma) = self.planes.split_at(picture.rgb.len() / 3);
                 let (cb, cr) = chroma.split_at(chroma.len() / 2);
                 bytes.resize(self.planes.len(), 0);

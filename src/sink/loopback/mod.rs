@@ -12,7 +12,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use self::encode::Encoder;
-use self::watch::Watcher;
+use self::watch::ReaderWatcher;
 use super::rate::frame_rate;
 use super::{Ending, Options, Sink, SinkError, card, check_size};
 use crate::frame::fit::Fit;
@@ -22,9 +22,9 @@ use crate::v4l2::loopback::{Layout, LoopbackError, Output};
 use crate::v4l2::reader_monitor::ReaderMonitor;
 
 /// Shortest time after which a picture is repeated.
-const MIN_HOLD: Duration = Duration::from_millis(100);
+const MIN_REPEAT_INTERVAL: Duration = Duration::from_millis(100);
 /// Period of the card while no client watches, which keeps the node alive.
-const IDLE_HOLD: Duration = Duration::from_secs(1);
+const IDLE_REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A virtual camera opened for writing.
 pub struct Loopback {
@@ -39,10 +39,10 @@ pub struct Loopback {
     /// Whether that is the still card.
     shows_card: bool,
     /// When the card was last written instead of a picture.
-    covered_ns: u64,
-    hold: Duration,
+    card_written_ns: u64,
+    repeat_interval: Duration,
     demand: Option<Demand>,
-    _watcher: Option<Watcher>,
+    _watcher: Option<ReaderWatcher>,
 }
 
 impl Loopback {
@@ -69,8 +69,9 @@ impl Loopback {
             fitted: ColorImage::new(output.size().0, output.size().1),
             bytes: Vec::new(),
             shows_card: true,
-            covered_ns: 0,
-            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(MIN_HOLD, IDLE_HOLD),
+            card_written_ns: 0,
+            repeat_interval: (2 * Duration::from_nanos(options.period_ns))
+                .clamp(MIN_REPEAT_INTERVAL, IDLE_REPEAT_INTERVAL),
             demand: options.demand.clone(),
             _watcher,
             output,
@@ -85,7 +86,7 @@ impl Loopback {
     }
 
     fn show_card(&mut self) -> Result<(), SinkError> {
-        card::draw(&mut self.fitted);
+        card::draw_card(&mut self.fitted);
         self.encoder.encode(&self.fitted, &mut self.bytes);
         self.shows_card = true;
         // Fill all buffers of the driver: a new reader first gets their content, which must not be an earlier picture.
@@ -94,24 +95,24 @@ impl Loopback {
 }
 
 /// Starts a thread that updates `demand` when readers of the camera come and go.
-fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
-    let refused = |cause| LoopbackError::System {
+fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<ReaderWatcher, SinkError> {
+    let system_error = |cause| LoopbackError::System {
         path: path.to_owned(),
         doing: "its readers cannot be detected; leave --on-demand out",
         cause,
     };
-    let (monitor, stop) = ReaderMonitor::new(output.device().clone()).map_err(refused)?;
+    let (monitor, stop) = ReaderMonitor::new(output.device().clone()).map_err(system_error)?;
     if !monitor.has_module_events() {
         tracing::info!(
             "{}: this version of v4l2loopback does not report its readers; every program that has it open counts as one",
             path.display()
         );
     }
-    Ok(Watcher::start((monitor, stop), demand).map_err(refused)?)
+    Ok(ReaderWatcher::start((monitor, stop), demand).map_err(system_error)?)
 }
 
 impl Sink for Loopback {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.encoder.encode(self.fit.fitted(frame, &mut self.fitted), &mut self.bytes);
         self.shows_card = false;
         self.output.write_frame(&self.bytes)?;
@@ -122,7 +123,7 @@ impl Sink for Loopback {
         self.wants_yuyv
     }
 
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         check_size(self.output.size(), frame.size())?;
         std::mem::swap(&mut self.bytes, &mut frame.bytes);
         self.shows_card = false;
@@ -131,13 +132,13 @@ impl Sink for Loopback {
     }
 
     /// The driver keeps the card, so it is rewritten only as often as any last picture.
-    fn cover(&mut self, _: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_card(&mut self, _: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         if !self.shows_card {
             self.show_card()?;
-            self.covered_ns = time_ns;
-        } else if u128::from(time_ns.saturating_sub(self.covered_ns)) >= self.hold.as_nanos() {
+            self.card_written_ns = time_ns;
+        } else if u128::from(time_ns.saturating_sub(self.card_written_ns)) >= self.repeat_interval.as_nanos() {
             self.output.write_frame(&self.bytes)?;
-            self.covered_ns = time_ns;
+            self.card_written_ns = time_ns;
         }
         Ok(ControlFlow::Continue(()))
     }
@@ -147,16 +148,16 @@ impl Sink for Loopback {
     }
 
     /// While no client watches, the card soon replaces the last picture, and is then rarely rewritten.
-    fn hold(&self) -> Option<Duration> {
+    fn repeat_interval(&self) -> Option<Duration> {
         match (self.is_unwatched(), self.shows_card) {
-            (true, true) => Some(IDLE_HOLD),
-            (true, false) => Some(MIN_HOLD),
-            (false, _) => Some(self.hold),
+            (true, true) => Some(IDLE_REPEAT_INTERVAL),
+            (true, false) => Some(MIN_REPEAT_INTERVAL),
+            (false, _) => Some(self.repeat_interval),
         }
     }
 
     /// While no client watches, the still card replaces the last frame.
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         if self.is_unwatched() && !self.shows_card {
             self.show_card()?;
         } else {

@@ -13,20 +13,20 @@ use crate::v4l2::reader_monitor::{ReaderEvent, ReaderMonitor, StopHandle};
 const WATCH_HOLD: Duration = Duration::from_millis(2500);
 
 /// A thread that watches for readers until it is dropped.
-pub(super) struct Watcher {
+pub(super) struct ReaderWatcher {
     stop: Option<StopHandle>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Watcher {
+impl ReaderWatcher {
     pub(super) fn start((mut monitor, stop): (ReaderMonitor, StopHandle), demand: Demand) -> io::Result<Self> {
-        let listen = move || follow_readers(&demand, &Clock::system(), |timeout| monitor.wait(timeout));
-        let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
+        let follow = move || follow_readers(&demand, &Clock::system(), |timeout| monitor.wait(timeout));
+        let thread = thread::Builder::new().name("audience".into()).spawn(follow)?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
 
-impl Drop for Watcher {
+impl Drop for ReaderWatcher {
     fn drop(&mut self) {
         drop(self.stop.take());
         // A panic of the thread was printed already.

@@ -42,19 +42,19 @@ pub(super) struct Format {
 }
 
 impl From<&NegotiatedFormat> for Format {
-    fn from(agreed: &NegotiatedFormat) -> Self {
-        Self { fourcc: agreed.fourcc, size: agreed.size }
+    fn from(negotiated: &NegotiatedFormat) -> Self {
+        Self { fourcc: negotiated.fourcc, size: negotiated.size }
     }
 }
 
 impl Format {
     /// Packs the format into one number, which threads exchange without a lock. 16 bits per side are sufficient.
-    pub fn packed(self) -> u64 {
+    pub fn pack(self) -> u64 {
         let (width, height) = self.size;
         u64::from(u32::from_le_bytes(self.fourcc)) << 32 | u64::from(width as u16) << 16 | u64::from(height as u16)
     }
 
-    pub fn unpacked(packed: u64) -> Self {
+    pub fn unpack(packed: u64) -> Self {
         let side = |shift: u32| u32::from((packed >> shift) as u16);
         Self { fourcc: ((packed >> 32) as u32).to_le_bytes(), size: (side(16), side(0)) }
     }
@@ -96,7 +96,7 @@ impl Encoder {
     }
 
     /// Memory that a picture needs.
-    pub fn memory(&self) -> PictureMemory {
+    pub fn picture_memory(&self) -> PictureMemory {
         let (width, height) = self.format.size;
         match self.method {
             Method::Jpeg => PictureMemory {
@@ -112,7 +112,7 @@ impl Encoder {
 
     /// Encodes a picture, scaled into the format's size, into `bytes`, whose content is replaced.
     pub fn encode(&mut self, picture: &ColorImage, bytes: &mut Vec<u8>) {
-        let needed = self.memory().bytes;
+        let needed = self.picture_memory().bytes;
         let picture = self.fit.fitted(picture, &mut self.fitted);
         match &mut self.method {
             Method::Yuyv(encoder) => {
@@ -138,14 +138,14 @@ impl Encoder {
 
 /// Returns the modes of a camera that [`Encoder`] can write, with sizes from `MIN_SIDE_PX` to `MAX_SIDE_PX` a side.
 pub(super) fn writable_modes(modes: &[Mode]) -> Vec<Mode> {
-    let is_written =
+    let is_writable =
         |mode: &&Mode| Encoder::new(Format { fourcc: mode.fourcc, size: (MIN_SIDE_PX, MIN_SIDE_PX) }).is_some();
-    let bounded = |mode: &Mode| Some(Mode { sizes: bounded(&mode.sizes)?, ..mode.clone() });
-    modes.iter().filter(is_written).filter_map(bounded).collect()
+    let limited = |mode: &Mode| Some(Mode { sizes: limit_sizes(&mode.sizes)?, ..mode.clone() });
+    modes.iter().filter(is_writable).filter_map(limited).collect()
 }
 
 /// Returns the sizes within bounds; `None` if there are none.
-fn bounded(sizes: &Offer<(u32, u32)>) -> Option<Offer<(u32, u32)>> {
+fn limit_sizes(sizes: &Offer<(u32, u32)>) -> Option<Offer<(u32, u32)>> {
     let sides = MIN_SIDE_PX..=MAX_SIDE_PX;
     match sizes {
         Offer::These(sizes) => {
@@ -183,8 +183,9 @@ mod tests {
                 let mut encoder = Encoder::new(Format { fourcc: *fourcc, size }).unwrap();
                 let mut bytes = vec![7; 3];
                 encoder.encode(&picture, &mut bytes);
-                assert!((1..=encoder.memory().bytes).contains(&bytes.len()), "{}", FourCc(*fourcc));
-                let layout = Layout::with_stride(FourCc(*fourcc), size.0, size.1, encoder.memory().stride).unwrap();
+                assert!((1..=encoder.picture_memory().bytes).contains(&bytes.len()), "{}", FourCc(*fourcc));
+                let layout =
+                    Layout::with_stride(FourCc(*fourcc), size.0, size.1, encoder.picture_memory().stride).unwrap();
                 let mut decoded = ColorImage::default();
                 Decoder::new(&layout).unwrap().decode(&[&bytes], &mut decoded).unwrap();
                 assert_eq!(decoded.size(), size);
@@ -204,7 +205,7 @@ mod tests {
     #[test]
     fn a_format_is_one_number() {
         let format = Format { fourcc: *b"MJPG", size: (3840, 2160) };
-        assert_eq!(Format::unpacked(format.packed()), format);
+        assert_eq!(Format::unpack(format.pack()), format);
     }
 
     #[test]

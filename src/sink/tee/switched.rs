@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use super::*;
-use crate::sink::switch::{MemberState, Over};
+use crate::sink::tee_control::{MemberState, RunEnded};
 
 /// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
@@ -19,7 +19,7 @@ struct Fake {
     /// First bytes of the frames it got.
     got: Arc<std::sync::Mutex<Vec<u8>>>,
     repeats: Arc<AtomicU64>,
-    hold: Option<Duration>,
+    repeat_interval: Option<Duration>,
     /// The frame at which its reader leaves.
     leaves_at: Option<usize>,
     /// The frame that it fails to write.
@@ -35,7 +35,7 @@ fn full(name: &str) -> SinkError {
 }
 
 impl Sink for Fake {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let mut got = self.got.lock().unwrap();
         if self.fails_at == Some(got.len()) {
             return Err(full(self.name));
@@ -47,13 +47,13 @@ impl Sink for Fake {
         Ok(ControlFlow::Continue(()))
     }
 
-    fn hold(&self) -> Option<Duration> {
-        self.hold
+    fn repeat_interval(&self) -> Option<Duration> {
+        self.repeat_interval
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn repeat_frame(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         self.repeats.fetch_add(1, Ordering::SeqCst);
-        Ok(ControlFlow::Continue(self.hold.is_some()))
+        Ok(ControlFlow::Continue(self.repeat_interval.is_some()))
     }
 
     fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
@@ -67,22 +67,22 @@ impl Sink for Fake {
     }
 }
 
-fn switch() -> (Box<Tee>, Switchboard, Receiver<Notice>) {
+fn switch() -> (Box<Tee>, TeeControl, Receiver<MemberEvent>) {
     let (to, told) = mpsc::channel();
-    let (switch, board) = Tee::switched("window", move |what| drop(to.send(what)));
-    (Box::new(switch), board, told)
+    let (switch, control) = Tee::with_control("window", move |what| drop(to.send(what)));
+    (Box::new(switch), control, told)
 }
 
 /// Sends frames, each after the members have processed the previous one.
-fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
+fn write_frames(switch: &mut Tee, numbers: std::ops::Range<u8>) {
     let frames = |count: &Counter<OutputUse>| count().frames + count().lost;
     for number in numbers {
         switch.handle_requests();
-        let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.counter()).collect();
+        let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.create_counter()).collect();
         let before: Vec<_> = counts.iter().map(frames).collect();
         let mut frame = ColorImage::new(2, 2);
         frame.rgb.fill(number);
-        assert!(switch.put(&frame, number.into()).unwrap().is_continue());
+        assert!(switch.write_frame(&frame, number.into()).unwrap().is_continue());
         let began = Instant::now();
         let is_busy = |at: usize| frames(&counts[at]) == before[at] && !switch.outputs[at].1.has_ended();
         while (0..counts.len()).any(is_busy) {
@@ -93,14 +93,14 @@ fn put(switch: &mut Tee, numbers: std::ops::Range<u8>) {
 }
 
 /// Returns all notices so far, sorted by member.
-fn all(told: &Receiver<Notice>) -> Vec<(String, MemberState)> {
-    let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.fate)).collect();
+fn all(told: &Receiver<MemberEvent>) -> Vec<(String, MemberState)> {
+    let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.state)).collect();
     all.sort_by(|a, b| a.0.cmp(&b.0));
     all
 }
 
 fn began(name: &str) -> (String, MemberState) {
-    (name.into(), MemberState::Began)
+    (name.into(), MemberState::Started)
 }
 
 fn completed(name: &str, frames: u64) -> (String, MemberState) {
@@ -113,21 +113,21 @@ fn failed(name: &str, frames: u64, why: &str) -> (String, MemberState) {
 
 #[test]
 fn members_come_and_go_and_each_gets_the_frames_of_its_time() {
-    let (mut switch, board, told) = switch();
-    assert!(!switch.keeps());
-    put(&mut switch, 0..2);
+    let (mut switch, control, told) = switch();
+    assert!(!switch.has_outputs());
+    write_frames(&mut switch, 0..2);
     let (early, late) = (Fake::default(), Fake::default());
     let got = [Arc::clone(&early.got), Arc::clone(&late.got)];
-    board.add("early", Box::new(early)).unwrap();
-    put(&mut switch, 2..4);
-    assert!(switch.keeps());
-    let other = board.clone();
+    control.add("early", Box::new(early)).unwrap();
+    write_frames(&mut switch, 2..4);
+    assert!(switch.has_outputs());
+    let other = control.clone();
     thread::spawn(move || other.add("late", Box::new(late)).unwrap()).join().unwrap();
-    put(&mut switch, 4..5);
-    board.remove("early");
-    board.remove("nobody");
-    put(&mut switch, 5..7);
-    switch.finish(Ending::Whole).unwrap();
+    write_frames(&mut switch, 4..5);
+    control.remove("early");
+    control.remove("nobody");
+    write_frames(&mut switch, 5..7);
+    switch.finish(Ending::Complete).unwrap();
     assert_eq!(got.map(|got| got.lock().unwrap().clone()), [vec![2, 3, 4], vec![4, 5, 6]]);
     let expected = [began("early"), completed("early", 3), began("late"), completed("late", 3)];
     assert_eq!(all(&told), expected);
@@ -135,17 +135,17 @@ fn members_come_and_go_and_each_gets_the_frames_of_its_time() {
 
 #[test]
 fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() {
-    let (mut switch, board, told) = switch();
+    let (mut switch, control, told) = switch();
     let good = Fake::default();
     let got = Arc::clone(&good.got);
-    board.add("a", Box::new(Fake { name: "a", fails_at: Some(1), ..Fake::default() })).unwrap();
-    board.add("b", Box::new(good)).unwrap();
-    board.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
-    put(&mut switch, 0..5);
+    control.add("a", Box::new(Fake { name: "a", fails_at: Some(1), ..Fake::default() })).unwrap();
+    control.add("b", Box::new(good)).unwrap();
+    control.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
+    write_frames(&mut switch, 0..5);
     switch.handle_requests();
     assert_eq!(switch.outputs.len(), 1);
     // A member's failure during the run does not fail the run.
-    switch.finish(Ending::Whole).unwrap();
+    switch.finish(Ending::Complete).unwrap();
     assert_eq!(*got.lock().unwrap(), [0, 1, 2, 3, 4]);
     let [a, b, c] = [failed("a", 1, "cannot write a: full"), completed("b", 5), completed("c", 2)];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
@@ -153,36 +153,36 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
 
 #[test]
 fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
-    let (mut switch, board, told) = switch();
+    let (mut switch, control, told) = switch();
     let (complete, finish_at) = mpsc::channel();
-    board.add("slow", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
-    put(&mut switch, 0..1);
-    board.remove("slow");
-    put(&mut switch, 1..100);
+    control.add("slow", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
+    write_frames(&mut switch, 0..1);
+    control.remove("slow");
+    write_frames(&mut switch, 1..100);
     assert_eq!(all(&told), [began("slow")], "frames went on while it was not complete");
     let late = thread::spawn(move || {
         thread::sleep(Duration::from_millis(20));
         complete.send(()).unwrap();
     });
-    switch.finish(Ending::Whole).unwrap();
+    switch.finish(Ending::Complete).unwrap();
     assert_eq!(all(&told), [completed("slow", 1)], "the end waits for it");
     late.join().unwrap();
 }
 
 #[test]
 fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
-    let (mut switch, board, told) = switch();
-    board.add("a", Box::new(Fake { name: "a", finish_panics: true, ..Fake::default() })).unwrap();
-    board.add("b", Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
+    let (mut switch, control, told) = switch();
+    control.add("a", Box::new(Fake { name: "a", finish_panics: true, ..Fake::default() })).unwrap();
+    control.add("b", Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
     let (complete, finish_at) = mpsc::channel();
-    board.add("c", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
-    put(&mut switch, 0..2);
+    control.add("c", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
+    write_frames(&mut switch, 0..2);
     // After the others have failed, most likely.
     thread::spawn(move || {
         thread::sleep(Duration::from_millis(20));
         complete.send(()).unwrap();
     });
-    assert_eq!(switch.finish(Ending::Whole).unwrap_err().to_string(), "cannot write b: full");
+    assert_eq!(switch.finish(Ending::Complete).unwrap_err().to_string(), "cannot write b: full");
     let [a, b, c] = [
         failed("a", 2, "a: panicked: as it should; please report this"),
         failed("b", 2, "cannot write b: full"),
@@ -190,59 +190,59 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     ];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
     // A late request is refused, and reported as failed.
-    assert_eq!(board.add("d", Box::new(Fake::default())), Err(Over));
+    assert_eq!(control.add("d", Box::new(Fake::default())), Err(RunEnded));
     assert_eq!(all(&told), [failed("d", 0, "it was given up")]);
 }
 
 #[test]
 fn what_was_recorded_is_completed_though_the_run_fails() {
-    let (mut switch, board, told) = switch();
-    board.add("a", Box::new(Fake::default())).unwrap();
-    put(&mut switch, 0..3);
-    board.add("b", Box::new(Fake::default())).unwrap();
+    let (mut switch, control, told) = switch();
+    control.add("a", Box::new(Fake::default())).unwrap();
+    write_frames(&mut switch, 0..3);
+    control.add("b", Box::new(Fake::default())).unwrap();
     drop(switch);
     assert_eq!(all(&told), [began("a"), completed("a", 3), began("b"), completed("b", 0)]);
 }
 
 #[test]
 fn a_name_that_is_taken_goes_to_the_newer_member() {
-    let (mut switch, board, told) = switch();
+    let (mut switch, control, told) = switch();
     for _ in 0..2 {
-        board.add("a", Box::new(Fake::default())).unwrap();
-        put(&mut switch, 0..2);
+        control.add("a", Box::new(Fake::default())).unwrap();
+        write_frames(&mut switch, 0..2);
     }
     assert_eq!(switch.outputs.len(), 1);
-    switch.finish(Ending::Whole).unwrap();
+    switch.finish(Ending::Complete).unwrap();
     let told: Vec<_> = all(&told).into_iter().filter(|told| *told == completed("a", 2)).collect();
     assert_eq!(told.len(), 2);
 }
 
 #[test]
 fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due() {
-    let (mut switch, board, told) = switch();
-    assert_eq!(switch.hold(), Some(TICK));
-    let live = Fake { hold: Some(Duration::from_millis(5)), ..Fake::default() };
+    let (mut switch, control, told) = switch();
+    assert_eq!(switch.repeat_interval(), Some(TICK));
+    let live = Fake { repeat_interval: Some(Duration::from_millis(5)), ..Fake::default() };
     let (repeats, file) = (Arc::clone(&live.repeats), Fake::default());
-    board.add("file", Box::new(file)).unwrap();
-    assert_eq!(switch.repeat().unwrap(), ControlFlow::Continue(false));
+    control.add("file", Box::new(file)).unwrap();
+    assert_eq!(switch.repeat_frame().unwrap(), ControlFlow::Continue(false));
     assert_eq!(all(&told), [began("file")]);
-    board.add("live", Box::new(live)).unwrap();
-    put(&mut switch, 0..1);
+    control.add("live", Box::new(live)).unwrap();
+    write_frames(&mut switch, 0..1);
     let began_at = Instant::now();
     while repeats.load(Ordering::SeqCst) < 4 {
         assert!(began_at.elapsed() < HANG, "nobody calls it: it does so itself");
         thread::sleep(Duration::from_millis(1));
     }
-    board.remove("file");
-    assert_eq!(switch.repeat().unwrap(), ControlFlow::Continue(false));
-    switch.finish(Ending::Whole).unwrap();
+    control.remove("file");
+    assert_eq!(switch.repeat_frame().unwrap(), ControlFlow::Continue(false));
+    switch.finish(Ending::Complete).unwrap();
     assert_eq!(all(&told), [completed("file", 1), began("live"), completed("live", 1)]);
 }
 
 /// A stalled recording delays neither the camera nor the frames, and counts its losses.
 #[test]
 fn no_member_waits_for_another() {
-    let (mut switch, board, told) = switch();
+    let (mut switch, control, told) = switch();
     let (complete, finish_at) = mpsc::channel();
     let camera = Fake::default();
     let got = Arc::clone(&camera.got);
@@ -251,12 +251,12 @@ fn no_member_waits_for_another() {
     let (stuck, held) = (Arc::clone(&stalled.got), stalled.got.lock().unwrap().clone());
     assert!(held.is_empty());
     let hold = stuck.lock().unwrap();
-    board.add("stalled", Box::new(stalled)).unwrap();
-    board.add("camera", Box::new(Fake { finish_at: Some(finish_at), ..camera })).unwrap();
+    control.add("stalled", Box::new(stalled)).unwrap();
+    control.add("camera", Box::new(Fake { finish_at: Some(finish_at), ..camera })).unwrap();
     for number in 0..20 {
         let mut frame = ColorImage::new(2, 2);
         frame.rgb.fill(number);
-        assert!(switch.put(&frame, number.into()).unwrap().is_continue());
+        assert!(switch.write_frame(&frame, number.into()).unwrap().is_continue());
         let began = Instant::now();
         while got.lock().unwrap().last() != Some(&number) {
             assert!(began.elapsed() < HANG, "the camera waits");
@@ -264,8 +264,8 @@ fn no_member_waits_for_another() {
     }
     drop(hold);
     complete.send(()).unwrap();
-    let outputs = switch.outputs();
-    switch.finish(Ending::Whole).unwrap();
+    let outputs = switch.output_counters();
+    switch.finish(Ending::Complete).unwrap();
     // The first one that its thread dequeued, and the newest.
     let taken = stuck.lock().unwrap().clone();
     let count = taken.len() as u64;

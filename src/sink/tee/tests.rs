@@ -70,7 +70,7 @@ impl Fake {
 }
 
 impl Sink for Fake {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.wait();
         if self.taken == self.fails_at {
             return Err(self.full());
@@ -83,7 +83,7 @@ impl Sink for Fake {
         Ok(ControlFlow::Continue(()))
     }
 
-    fn cover(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_card(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.wait();
         let _ = self.tells.send("card".into());
         Ok(ControlFlow::Continue(()))
@@ -135,17 +135,17 @@ fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
     let sinks = [stalled, Fake { is_live: true, ..camera }, file];
     let mut tee = tee(sinks, Backpressure::DropOldest, &Arc::default());
     assert_eq!((tee.describe().as_str(), tee.is_live()), ("stalled, camera, file", true));
-    let frames = tee.outputs();
+    let frames = tee.output_counters();
     for number in 0..50 {
-        assert!(tee.put(&picture(number), number.into()).unwrap().is_continue());
+        assert!(tee.write_frame(&picture(number), number.into()).unwrap().is_continue());
         assert_eq!((next(&shown), next(&written)), (number.to_string(), number.to_string()));
         until("it was given the first", || given.load(Ordering::Relaxed) == 1);
     }
     assert!(taken.try_recv().is_err(), "it has taken none yet");
     // Two of them: the one that it had and the newest; all others were dropped.
     drop(may);
-    tee.finish(Ending::Whole).unwrap();
-    assert_eq!((next(&taken), next(&taken), next(&taken)), ("0".into(), "49".into(), "Whole".into()));
+    tee.finish(Ending::Complete).unwrap();
+    assert_eq!((next(&taken), next(&taken), next(&taken)), ("0".into(), "49".into(), "Complete".into()));
     let expected = |output: &str, frames, lost| OutputUse { output: output.into(), frames, repeats: 0, lost };
     assert_eq!(used(&frames, "stalled"), expected("stalled", 2, 48));
     assert_eq!(used(&frames, "camera"), expected("camera", 50, 0));
@@ -159,13 +159,13 @@ fn files_that_are_to_miss_nothing_get_all_and_what_is_live_waits_for_none_of_the
     let (may, may_take) = mpsc::channel();
     slow.may_take = Some(may_take);
     let mut tee = tee([slow, camera], Backpressure::Block, &Arc::default());
-    let frames = tee.outputs();
+    let frames = tee.output_counters();
     // One is being written, two wait in the queue, and the next one waits for space.
     let gives = thread::spawn(move || {
         for number in 0..20 {
-            assert!(tee.put(&picture(number), 0).unwrap().is_continue());
+            assert!(tee.write_frame(&picture(number), 0).unwrap().is_continue());
         }
-        tee.finish(Ending::Whole).unwrap();
+        tee.finish(Ending::Complete).unwrap();
     });
     until("the camera has the one that waits for the file", || shown.try_iter().last().is_some_and(|last| last == "3"));
     for _ in 0..20 {
@@ -184,24 +184,24 @@ fn driven(
 ) {
     let closed = Arc::new(AtomicBool::new(false));
     let tee = tee(sinks, backpressure, &closed);
-    let (mut shutter, release) =
+    let (mut shutter, control) =
         Shutter::new(tee, (2, 2), Duration::from_millis(5), Demand::new(), Clock::system(), closed);
     let (end, ended) = mpsc::channel::<()>();
     let (wish, wishes) = mpsc::channel::<()>();
     let drives = thread::spawn(move || {
         let mut time_ns = 0;
         while !matches!(ended.try_recv(), Err(mpsc::TryRecvError::Disconnected)) {
-            match wishes.recv_timeout(shutter.hold().unwrap()) {
+            match wishes.recv_timeout(shutter.repeat_interval().unwrap()) {
                 Ok(()) => {
                     time_ns += 5_000_000;
-                    assert!(shutter.put(&picture(7), time_ns).unwrap().is_continue());
+                    assert!(shutter.write_frame(&picture(7), time_ns).unwrap().is_continue());
                 }
-                Err(_) => assert!(shutter.repeat().unwrap().is_continue()),
+                Err(_) => assert!(shutter.repeat_frame().unwrap().is_continue()),
             }
         }
-        Box::new(shutter).finish(Ending::Whole).unwrap();
+        Box::new(shutter).finish(Ending::Complete).unwrap();
     });
-    test(&release, &|| wish.send(()).unwrap());
+    test(&control, &|| wish.send(()).unwrap());
     drop(end);
     drives.join().unwrap();
 }
@@ -215,11 +215,11 @@ fn off_reaches_what_is_live_beside_an_output_that_stalls() {
         let (mut stalled, taken) = fake("pipe");
         let (may, may_take) = mpsc::channel();
         stalled.may_take = Some(may_take);
-        driven([stalled, camera], backpressure, |release, give| {
+        driven([stalled, camera], backpressure, |control, give| {
             (0..6).for_each(|_| give());
             assert_eq!(next(&shown), "7");
-            release.close(true);
-            let note = release.wait_covered().unwrap().expect("the pipe has not the card");
+            control.close(true);
+            let note = control.wait_for_card().unwrap().expect("the pipe has not the card");
             assert!(note.starts_with("pipe: "), "{note}");
             let last = shown.try_iter().last().expect("the card");
             assert_eq!(last, "card", "{backpressure:?}: answered before the camera had it");
@@ -227,8 +227,8 @@ fn off_reaches_what_is_live_beside_an_output_that_stalls() {
             assert_eq!(next(&shown), "card", "and no picture after it");
             drop(may);
             until("the pipe has the card", || taken.try_iter().last().is_some_and(|last| last == "card"));
-            assert_eq!(release.wait_covered(), Ok(None));
-            release.close(false);
+            assert_eq!(control.wait_for_card(), Ok(None));
+            control.close(false);
             give();
             until("pictures again", || shown.try_iter().last().is_some_and(|last| last == "7"));
         });
@@ -241,12 +241,12 @@ fn off_is_no_success_while_something_live_keeps_the_picture() {
     let (may, may_take) = mpsc::channel();
     (camera.is_live, camera.may_take) = (true, Some(may_take));
     let (file, written) = fake("file");
-    driven([camera, file], Backpressure::DropOldest, |release, give| {
+    driven([camera, file], Backpressure::DropOldest, |control, give| {
         give();
         may.send(()).unwrap();
         assert_eq!((next(&shown), next(&written)), ("7".into(), "7".into()));
-        release.close(true);
-        assert_eq!(release.wait_covered(), Err(CardNotShown("camera".into())));
+        control.close(true);
+        assert_eq!(control.wait_for_card(), Err(CardNotShown("camera".into())));
         assert!(written.try_iter().any(|what| what == "card"), "the file has it");
         drop(may);
         until("the camera has the card", || shown.try_iter().last().is_some_and(|last| last == "card"));
@@ -258,7 +258,7 @@ fn who_asks_of_a_run_that_has_ended_or_hangs_learns_that() {
     let (mut stalled, _taken) = fake("pipe");
     let (may, may_take) = mpsc::channel();
     stalled.may_take = Some(may_take);
-    let (mut shutter, release) = Shutter::new(
+    let (mut shutter, control) = Shutter::new(
         Box::new(stalled),
         (2, 2),
         Duration::from_millis(5),
@@ -266,12 +266,12 @@ fn who_asks_of_a_run_that_has_ended_or_hangs_learns_that() {
         Clock::system(),
         Arc::default(),
     );
-    let hangs = thread::spawn(move || shutter.put(&picture(7), 0).unwrap().is_continue());
-    release.close(true);
-    assert!(release.wait_covered().unwrap().is_some_and(|note| note.starts_with("pipe: busy")));
+    let hangs = thread::spawn(move || shutter.write_frame(&picture(7), 0).unwrap().is_continue());
+    control.close(true);
+    assert!(control.wait_for_card().unwrap().is_some_and(|note| note.starts_with("pipe: busy")));
     drop(may);
     assert!(hangs.join().unwrap());
-    assert_eq!(release.wait_covered(), Ok(None));
+    assert_eq!(control.wait_for_card(), Ok(None));
 }
 
 #[test]
@@ -283,11 +283,11 @@ fn a_sink_whose_reader_goes_is_left_out_and_the_last_ends_it() {
     let mut given = 0;
     until("both have gone", || {
         given += 1;
-        tee.put(&picture(1), given).unwrap().is_break()
+        tee.write_frame(&picture(1), given).unwrap().is_break()
     });
-    tee.finish(Ending::Cut).unwrap();
-    assert_eq!(of_a.iter().collect::<Vec<_>>(), ["1", "Whole"]);
-    assert_eq!(of_b.iter().collect::<Vec<_>>(), ["1", "1", "1", "Whole"]);
+    tee.finish(Ending::Truncated).unwrap();
+    assert_eq!(of_a.iter().collect::<Vec<_>>(), ["1", "Complete"]);
+    assert_eq!(of_b.iter().collect::<Vec<_>>(), ["1", "1", "1", "Complete"]);
 }
 
 #[test]
@@ -296,8 +296,8 @@ fn all_are_completed_and_the_first_error_is_told() {
     let (mut b, of_b) = fake("b");
     (a.finish_fails, b.finish_fails) = (true, true);
     let broken = tee([a, b], Backpressure::DropOldest, &Arc::default());
-    assert_eq!(broken.finish(Ending::Whole).unwrap_err().to_string(), "cannot write a: full");
-    assert_eq!((next(&of_a), next(&of_b)), ("Whole".into(), "Whole".into()));
+    assert_eq!(broken.finish(Ending::Complete).unwrap_err().to_string(), "cannot write a: full");
+    assert_eq!((next(&of_a), next(&of_b)), ("Complete".into(), "Complete".into()));
 }
 
 #[test]
@@ -309,14 +309,14 @@ fn one_that_fails_is_left_out_unless_it_is_live_and_is_an_error_in_the_end() {
         let mut tee = tee([broken, good], Backpressure::Block, &Arc::default());
         let mut error = None;
         for number in 0..100 {
-            error = error.or(tee.put(&picture(number), 0).err());
+            error = error.or(tee.write_frame(&picture(number), 0).err());
         }
         // The failure was detected by then, or is detected now.
-        let error = error.or(tee.finish(Ending::Cut).err()).unwrap();
+        let error = error.or(tee.finish(Ending::Truncated).err()).unwrap();
         assert_eq!(error.to_string(), "cannot write broken: full");
         assert_eq!(of_broken.iter().count(), 1, "what has failed is not completed");
         let good: Vec<_> = of_good.iter().collect();
-        assert!(is_live || good.len() == 101 && good[100] == "Cut", "{good:?}");
+        assert!(is_live || good.len() == 101 && good[100] == "Truncated", "{good:?}");
     }
 }
 
@@ -324,7 +324,7 @@ fn one_that_fails_is_left_out_unless_it_is_live_and_is_an_error_in_the_end() {
 fn a_panic_is_an_error_of_that_output() {
     struct Panics;
     impl Sink for Panics {
-        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        fn write_frame(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
             panic!("as it should")
         }
         fn describe(&self) -> String {
@@ -334,8 +334,8 @@ fn a_panic_is_an_error_of_that_output() {
     let (good, of_good) = fake("good");
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Panics), Box::new(good)];
     let mut tee = Box::new(Tee::new(sinks, Backpressure::Block, Arc::default()).unwrap());
-    assert!((0..9).all(|number| tee.put(&picture(number), 0).unwrap().is_continue()));
-    let error = tee.finish(Ending::Whole).unwrap_err();
+    assert!((0..9).all(|number| tee.write_frame(&picture(number), 0).unwrap().is_continue()));
+    let error = tee.finish(Ending::Complete).unwrap_err();
     assert_eq!(error.to_string(), "panics: panicked: as it should; please report this");
     assert_eq!(of_good.iter().count(), 10);
 }
@@ -344,7 +344,7 @@ fn a_panic_is_an_error_of_that_output() {
 fn outputs_that_are_given_up_are_not_completed() {
     let (a, of_a) = fake("a");
     let mut tee = tee([a, fake("b").0], Backpressure::Block, &Arc::default());
-    assert!(tee.put(&picture(3), 0).unwrap().is_continue());
+    assert!(tee.write_frame(&picture(3), 0).unwrap().is_continue());
     drop(tee);
     assert_eq!(of_a.iter().collect::<Vec<_>>(), ["3"], "what was under way comes, and nothing is finished");
 }

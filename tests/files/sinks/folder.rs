@@ -15,7 +15,7 @@ fn pictures_are_numbered_and_exact() {
     let frames: Vec<_> = (0..3).map(|frame| picture(17, 13, frame)).collect();
     let mut sink = open(&out.join(""), &options((17, 13))).unwrap();
     put_all(&mut *sink, &frames);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(listing(&out), [".bokehcam", "000000.png", "000001.png", "000002.png"]);
     for (name, frame) in listing(&out)[1..].iter().zip(&frames) {
         assert_eq!(image::open(out.join(name)).unwrap().into_rgb8().into_raw(), frame.rgb);
@@ -28,7 +28,7 @@ fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
     let out = folder.path().join("out");
     let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[0, 1, 2].map(|frame| picture(6, 4, frame)));
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     for name in ["7.png", "20240101.png", "notes.txt"] {
         fs::write(out.join(name), "mine").unwrap();
     }
@@ -43,13 +43,13 @@ fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
     let mut sink = open(&out.join(""), &two).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5)]);
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old, "the old ones stay until the new are whole");
-    sink.finish(Ending::Cut).unwrap();
+    sink.finish(Ending::Truncated).unwrap();
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old);
     assert_eq!(listing(&folder.path().join("out.incomplete")), [".bokehcam", "000000.png"]);
 
     let mut sink = open(&out.join(""), &two).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5), picture(6, 4, 6)]);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     let expected = [".bokehcam", "000000.png", "000001.png", "20240101.png", "7.png", "notes.txt"];
     assert_eq!(listing(&out), expected, "no tail of the old ones");
     assert_ne!(fs::read(out.join("000000.png")).unwrap(), old);
@@ -67,9 +67,9 @@ fn a_failed_picture_leaves_no_partial_name() {
         if taken {
             fs::create_dir(out.join("000001.png")).unwrap();
         }
-        let error = sink.put(next, PERIOD_NS).unwrap_err();
+        let error = sink.write_frame(next, PERIOD_NS).unwrap_err();
         assert_eq!(matches!(error, SinkError::Folder(FolderError::Foreign { .. })), taken, "{error}");
-        sink.finish(Ending::Cut).unwrap();
+        sink.finish(Ending::Truncated).unwrap();
         let expected: &[&str] = if taken { &["000000.png", "000001.png"] } else { &["000000.png"] };
         assert_eq!(listing(&out)[1..], *expected);
     }
@@ -83,9 +83,9 @@ fn a_folder_that_is_moved_away_gets_no_more_pictures_and_another_of_its_name_non
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::rename(&out, &away).unwrap();
     fs::create_dir(&out).unwrap();
-    let error = sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
+    let error = sink.write_frame(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
     assert!(error.to_string().contains("was removed or moved meanwhile"), "{error}");
-    sink.finish(Ending::Cut).unwrap();
+    sink.finish(Ending::Truncated).unwrap();
     assert_eq!((listing(&out).len(), listing(&away)), (0, vec![".bokehcam".to_owned(), "000000.png".to_owned()]));
 }
 
@@ -96,7 +96,7 @@ fn a_folder_that_is_removed_is_an_error_and_not_made_anew() {
     let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::remove_dir_all(&out).unwrap();
-    let error = sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
+    let error = sink.write_frame(&picture(6, 4, 1), PERIOD_NS).unwrap_err();
     assert!(error.to_string().contains("was removed or moved meanwhile"), "{error}");
     assert!(!out.exists());
 }

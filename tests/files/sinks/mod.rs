@@ -44,7 +44,7 @@ pub fn open(name: &Path, options: &Options) -> Result<Box<dyn Sink>, SinkError> 
 /// Puts frames at exactly the announced period.
 pub fn put_all(sink: &mut dyn Sink, frames: &[ColorImage]) {
     for (frame, at) in frames.iter().zip(0..) {
-        assert_eq!(sink.put(frame, at * PERIOD_NS).unwrap(), ControlFlow::Continue(()));
+        assert_eq!(sink.write_frame(frame, at * PERIOD_NS).unwrap(), ControlFlow::Continue(()));
     }
 }
 

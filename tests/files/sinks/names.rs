@@ -67,7 +67,7 @@ fn what_is_nothing_else_is_no_folder_and_what_was_meant_is_said() {
     assert!(error.contains("it is a folder") && error.contains(&format!("{name}/ (with")), "{error}");
     let mut sink = open(&folder.path().join(""), &options((6, 4))).unwrap();
     super::put_all(&mut *sink, &[super::picture(6, 4, 0)]);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(name.parse::<Target>().unwrap(), Target::Folder(name.into()));
 }
 

@@ -66,7 +66,7 @@ fn colours_survive_within_two_levels() {
             for code in 0..125u32 {
                 let rgb = [code % 5, code / 5 % 5, code / 25].map(|step| (step * 255 / 4) as u8);
                 let mut planes = Vec::new();
-                converter.append(&flat(width, height, rgb), &mut planes);
+                converter.append_planes(&flat(width, height, rgb), &mut planes);
                 for pixel in decode(matrix, width as usize, height as usize, &planes) {
                     let off = pixel.iter().zip(rgb).map(|(value, exact)| (value - f64::from(exact)).abs());
                     assert!(off.fold(0.0, f64::max) <= 2.0, "{matrix:?} {rgb:?} came back as {pixel:?}");
@@ -82,9 +82,9 @@ fn chroma_is_the_mean_of_its_four_pixels() {
     image.rgb[..3].copy_from_slice(&[255, 0, 0]);
     image.rgb[9..].copy_from_slice(&[255, 0, 0]);
     let mut mixed = Vec::new();
-    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append(&image, &mut mixed);
+    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append_planes(&image, &mut mixed);
     let mut mean = Vec::new();
-    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append(&flat(2, 2, [127, 0, 0]), &mut mean);
+    Converter::new(YcbcrMatrix::Bt709, Range::Limited).append_planes(&flat(2, 2, [127, 0, 0]), &mut mean);
     assert!(mixed[4].abs_diff(mean[4]) <= 1 && mixed[5].abs_diff(mean[5]) <= 1);
     assert_eq!((mixed[0], mixed[1]), (63, 16));
 }
@@ -118,9 +118,9 @@ fn an_hour_without_a_picture_is_no_hour_of_data() {
     let name = folder.path().join("clip.y4m");
     let mut sink = open(&name, &options((2, 2))).unwrap();
     for at in [0, 90_000, 90_001] {
-        assert!(sink.put(&flat(2, 2, [0; 3]), at * PERIOD_NS).unwrap().is_continue());
+        assert!(sink.write_frame(&flat(2, 2, [0; 3]), at * PERIOD_NS).unwrap().is_continue());
     }
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(lumas(&fs::read(&name).unwrap(), 6).len(), 10 * 25 + 3, "ten seconds, and the frames");
 }
 
@@ -128,7 +128,7 @@ fn an_hour_without_a_picture_is_no_hour_of_data() {
 fn a_stream_of_no_frames_has_its_header() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("empty.y4m");
-    open(&name, &options((6, 4))).unwrap().finish(Ending::Whole).unwrap();
+    open(&name, &options((6, 4))).unwrap().finish(Ending::Complete).unwrap();
     assert!(fs::read(&name).unwrap().starts_with(b"YUV4MPEG2 W6 H4 F25:1"));
 }
 
@@ -156,8 +156,8 @@ impl Write for ClosedPipe {
 #[test]
 fn a_reader_that_goes_ends_the_stream_cleanly() {
     let mut sink: Box<dyn Sink> = Box::new(Y4m::new(ClosedPipe(150), Path::new("pipe"), &options((6, 4))));
-    assert_eq!(sink.put(&picture(6, 4, 0), 0).unwrap(), ControlFlow::Continue(()));
-    assert_eq!(sink.put(&picture(6, 4, 1), PERIOD_NS).unwrap(), ControlFlow::Continue(()));
-    assert_eq!(sink.put(&picture(6, 4, 2), 2 * PERIOD_NS).unwrap(), ControlFlow::Break(()));
-    sink.finish(Ending::Whole).unwrap();
+    assert_eq!(sink.write_frame(&picture(6, 4, 0), 0).unwrap(), ControlFlow::Continue(()));
+    assert_eq!(sink.write_frame(&picture(6, 4, 1), PERIOD_NS).unwrap(), ControlFlow::Continue(()));
+    assert_eq!(sink.write_frame(&picture(6, 4, 2), 2 * PERIOD_NS).unwrap(), ControlFlow::Break(()));
+    sink.finish(Ending::Complete).unwrap();
 }

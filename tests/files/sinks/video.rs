@@ -74,7 +74,7 @@ fn files_are_whole_and_tagged() {
         let frames: Vec<_> = (0..5).map(|frame| picture(width, height, frame)).collect();
         put_all(&mut *sink, &frames);
         assert!(!name.exists());
-        sink.finish(Ending::Whole).unwrap();
+        sink.finish(Ending::Complete).unwrap();
         assert_eq!(probe(&name, TAGS), expected, "{extension}");
         assert_eq!(times(&name), (vec![0, 40, 80, 120, 160], 200), "{extension}");
         if extension == "mp4" {
@@ -98,9 +98,9 @@ fn frames_keep_their_times() {
         let mut sink = open(&name, &options((64, 48))).unwrap();
         for (ms, number) in at_ms.into_iter().zip(0..) {
             let time_ns = 123_456_789 + ms * 1_000_000;
-            assert!(sink.put(&picture(64, 48, number), time_ns).unwrap().is_continue());
+            assert!(sink.write_frame(&picture(64, 48, number), time_ns).unwrap().is_continue());
         }
-        sink.finish(Ending::Whole).unwrap();
+        sink.finish(Ending::Complete).unwrap();
         let (shown, duration_ms) = times(&name);
         let off_ms = shown.iter().zip(at_ms).map(|(shown, at)| shown.abs_diff(at)).max();
         assert!(shown.len() == at_ms.len() && off_ms <= Some(1), "{extension}: {shown:?}");
@@ -117,7 +117,7 @@ fn colours_are_kept() {
         let shown = picture(64, 48, 3);
         let mut sink = open(&name, &options((64, 48))).unwrap();
         put_all(&mut *sink, std::slice::from_ref(&shown));
-        sink.finish(Ending::Whole).unwrap();
+        sink.finish(Ending::Complete).unwrap();
         let decoded = Command::new("ffmpeg")
             .args(["-v", "error", "-i"])
             .arg(&name)
@@ -137,10 +137,10 @@ fn a_failing_ffmpeg_is_the_error_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     // One column cannot be encoded as 4:2:0, which ffmpeg detects at the first frame.
     let mut sink = open(&folder.path().join("clip.mp4"), &options((1, 1000))).unwrap();
-    let mut frames = (0..).map(|at| sink.put(&picture(1, 1000, 0), at * PERIOD_NS));
+    let mut frames = (0..).map(|at| sink.write_frame(&picture(1, 1000, 0), at * PERIOD_NS));
     let error = frames.find_map(Result::err).unwrap();
-    let SinkError::Ffmpeg { status, said, .. } = &error else { panic!("{error}") };
-    assert!(status.contains('1') && !said.is_empty(), "{error}");
+    let SinkError::Ffmpeg { status, stderr, .. } = &error else { panic!("{error}") };
+    assert!(status.contains('1') && !stderr.is_empty(), "{error}");
     drop(sink);
     assert!(listing(folder.path()).is_empty());
 }
@@ -149,7 +149,7 @@ fn a_failing_ffmpeg_is_the_error_and_leaves_nothing() {
 #[ignore = "needs ffmpeg"]
 fn no_frame_is_no_file() {
     let folder = tempfile::tempdir().unwrap();
-    open(&folder.path().join("clip.mp4"), &options((64, 48))).unwrap().finish(Ending::Whole).unwrap();
+    open(&folder.path().join("clip.mp4"), &options((64, 48))).unwrap().finish(Ending::Complete).unwrap();
     assert!(listing(folder.path()).is_empty());
 }
 
@@ -181,7 +181,7 @@ fn put_until(sink: &mut dyn Sink, enough: impl Fn(u32) -> bool) -> (u32, Result<
         if enough(number) {
             return (number, Ok(()));
         }
-        match sink.put(&picture(320, 240, number), u64::from(number) * PERIOD_NS) {
+        match sink.write_frame(&picture(320, 240, number), u64::from(number) * PERIOD_NS) {
             Ok(flow) => assert!(flow.is_continue()),
             Err(error) => return (number, Err(error)),
         }
@@ -201,7 +201,7 @@ fn what_a_killed_ffmpeg_had_written_can_be_played() {
         put.unwrap();
         signal("-KILL", &encoder(folder.path()));
         let error = put_until(&mut *sink, |_| false).1.unwrap_err();
-        sink.finish(Ending::Cut).unwrap();
+        sink.finish(Ending::Truncated).unwrap();
         let SinkError::Kept { error, kept } = &error else { panic!("{error}") };
         assert!(error.to_string().contains("SIGKILL"), "{error}");
         assert_eq!(listing(folder.path()), [format!("clip.incomplete.{extension}")]);
@@ -221,10 +221,10 @@ fn an_ffmpeg_that_hangs_ends_with_the_run() {
         signal("-STOP", &encoder(folder.path()));
         options.stop.store(true, std::sync::atomic::Ordering::Relaxed);
         let error = if at_the_end {
-            sink.finish(Ending::Cut).unwrap_err()
+            sink.finish(Ending::Truncated).unwrap_err()
         } else {
             let error = put_until(&mut *sink, |_| false).1.unwrap_err();
-            sink.finish(Ending::Cut).unwrap();
+            sink.finish(Ending::Truncated).unwrap();
             error
         };
         assert!(error.to_string().contains("it hung"), "{error}");
@@ -242,7 +242,7 @@ fn a_video_that_was_cut_short_replaces_nothing() {
     fs::write(&name, "old").unwrap();
     let mut sink = open(&name, &forced((64, 48))).unwrap();
     put_all(&mut *sink, &[flat(64, 48, [90; 3]), flat(64, 48, [99; 3])]);
-    sink.finish(Ending::Cut).unwrap();
+    sink.finish(Ending::Truncated).unwrap();
     assert_eq!(fs::read(&name).unwrap(), b"old");
     let kept = folder.path().join("clip.incomplete.mp4");
     assert_eq!(times(&kept), (vec![0, 40], 80));

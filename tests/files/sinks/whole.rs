@@ -23,7 +23,7 @@ fn a_file_appears_only_when_it_is_whole() {
 
     let mut sink = open(&name, &options((6, 4))).unwrap();
     put_all(&mut *sink, &frames);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(listing(name.parent().unwrap()), ["clip.y4m"]);
     let header = b"YUV4MPEG2 W6 H4 F25:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
     assert_eq!(fs::read(&name).unwrap().len(), header.len() + 3 * (6 + 24 + 12), "header and three frames of 4:2:0");
@@ -31,7 +31,7 @@ fn a_file_appears_only_when_it_is_whole() {
     assert!(matches!(open(&name, &options((6, 4))), Err(SinkError::Exists { .. })));
     let mut sink = open(&name, &forced((6, 4))).unwrap();
     put_all(&mut *sink, &frames[..1]);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(fs::read(&name).unwrap().len(), header.len() + 42);
 }
 
@@ -42,7 +42,7 @@ fn what_appeared_meanwhile_is_not_overwritten_and_the_frames_are_kept() {
     let mut sink = open(&name, &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
     fs::write(&name, "mine").unwrap();
-    let error = sink.finish(Ending::Whole).unwrap_err();
+    let error = sink.finish(Ending::Complete).unwrap_err();
     let SinkError::Kept { error, kept } = &error else { panic!("{error}") };
     assert!(matches!(**error, SinkError::Exists { .. }), "{error}");
     assert_eq!(fs::read(&name).unwrap(), b"mine");
@@ -60,7 +60,7 @@ fn what_was_cut_short_replaces_nothing() {
         }
         let mut sink = open(&name, &forced((6, 4))).unwrap();
         put_all(&mut *sink, &[picture(6, 4, 0)]);
-        sink.finish(Ending::Cut).unwrap();
+        sink.finish(Ending::Truncated).unwrap();
         assert_eq!(listing(folder.path()), expected);
     }
     assert_eq!(fs::read(&name).unwrap(), b"old");
@@ -73,11 +73,11 @@ fn two_that_write_one_file_never_mix() {
     let [mut one, mut two] = [0, 1].map(|_| open(&name, &options((6, 4))).unwrap());
     for frame in 0..3 {
         for (sink, grey) in [(&mut one, 0), (&mut two, 255)] {
-            assert!(sink.put(&flat(6, 4, [grey; 3]), frame * PERIOD_NS).unwrap().is_continue());
+            assert!(sink.write_frame(&flat(6, 4, [grey; 3]), frame * PERIOD_NS).unwrap().is_continue());
         }
     }
-    one.finish(Ending::Whole).unwrap();
-    assert!(matches!(two.finish(Ending::Whole), Err(SinkError::Kept { .. })));
+    one.finish(Ending::Complete).unwrap();
+    assert!(matches!(two.finish(Ending::Complete), Err(SinkError::Kept { .. })));
     let has = |name: &str, luma: u8| {
         let bytes = fs::read(folder.path().join(name)).unwrap();
         bytes.split(|byte| *byte == b'\n').filter(|part| part.len() > 24 && part.starts_with(&[luma; 24])).count()
@@ -98,7 +98,7 @@ fn part_files_of_others_and_links_there_are_left_alone() {
     for name in ["clip.y4m", "other.y4m"] {
         let mut sink = open(&at(name), &options((6, 4))).unwrap();
         put_all(&mut *sink, &[picture(6, 4, 0)]);
-        sink.finish(Ending::Whole).unwrap();
+        sink.finish(Ending::Complete).unwrap();
         assert!(!at(name).is_symlink());
     }
     assert_eq!(fs::read(at("victim")).unwrap(), b"mine");
@@ -113,7 +113,7 @@ fn what_a_killed_run_left_is_kept_under_a_name_that_shows() {
     fs::write(at(".clip.y4m.78-0.part"), "").unwrap();
     let mut sink = open(&at("clip.y4m"), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 0)]);
-    sink.finish(Ending::Whole).unwrap();
+    sink.finish(Ending::Complete).unwrap();
     assert_eq!(listing(folder.path()), ["clip.incomplete.y4m", "clip.y4m"]);
     assert_eq!(fs::read(at("clip.incomplete.y4m")).unwrap(), b"take");
 }

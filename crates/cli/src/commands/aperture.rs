@@ -15,7 +15,7 @@ use bokehcam::look::ApertureSetting;
 use bokehcam::look::number::in_range_parser;
 use bokehcam::recording::still::write_color;
 
-use bokehcam_lab::aperture::{Analysis, RankErrors, draw, error_by_rank};
+use bokehcam_lab::aperture::{Analysis, RankErrors, draw_sheet, plot_error_by_rank};
 
 /// Analyse how well a few separable terms approximate an aperture
 ///
@@ -105,7 +105,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     let mut analyses = Vec::new();
     for name in &command.apertures {
         let mask = Aperture { shape: name.load()?, intensity: 0.0 }.to_mask(usize::from(command.size), command.rim);
-        analyses.push(Analysis::of(name.to_string(), &mask, &ranks));
+        analyses.push(Analysis::new(name.to_string(), &mask, &ranks));
     }
     let table = Table {
         size_px: usize::from(command.size),
@@ -113,11 +113,11 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
         apertures: analyses.iter().zip(&outputs).map(|(analysis, path)| Row::new(analysis, path)).collect(),
     };
     let json = serde_json::to_vec_pretty(&table).map_err(|error| CliError::io(&table_path)(error.into()))?;
-    let plot = error_by_rank(&analyses, command.size, command.rim).map_err(CliError::Diagram)?;
+    let plot = plot_error_by_rank(&analyses, command.size, command.rim).map_err(CliError::Diagram)?;
 
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
     for (analysis, path) in analyses.iter().zip(&outputs) {
-        write_color(path, &draw(analysis), command.output.force)?;
+        write_color(path, &draw_sheet(analysis), command.output.force)?;
     }
     write_atomically(&plot_path, plot.as_bytes(), command.output.force)?;
     write_atomically(&table_path, &json, command.output.force)?;

@@ -7,7 +7,7 @@ use clap::builder::BoolishValueParser;
 
 use crate::options::named_value_parser;
 use bokehcam::look::number::in_range_parser;
-use bokehcam_window::state::{Shown, TEXT_SCALES};
+use bokehcam_window::state::{Shown, TEXT_SCALE_RANGE};
 use bokehcam_window::window::ThemeChoice;
 
 /// What a window shows first; all of it can be changed there.
@@ -36,7 +36,7 @@ pub struct Window {
           action = clap::ArgAction::Set, hide_possible_values = true)]
     pub panel: bool,
     /// Size of text and controls; 1 is normal [default: that of the last session]
-    #[arg(long, value_name = "TIMES", value_parser = in_range_parser(TEXT_SCALES))]
+    #[arg(long, value_name = "TIMES", value_parser = in_range_parser(TEXT_SCALE_RANGE))]
     pub text_scale: Option<f32>,
     /// Enable shortcuts without Ctrl; --single-keys=false is for speech input [default: that of the last session]
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_missing_value = "true",

@@ -66,10 +66,10 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
                 if over.load(Ordering::SeqCst) {
                     break;
                 }
-                let _ = camera.put(&picture(is_there.load(Ordering::SeqCst)), frame * 50_000_000);
+                let _ = camera.write_frame(&picture(is_there.load(Ordering::SeqCst)), frame * 50_000_000);
                 thread::sleep(Duration::from_millis(50));
             }
-            let _ = camera.finish(Ending::Whole);
+            let _ = camera.finish(Ending::Complete);
         });
         let _ends = Ends(&over);
         until("the camera shows something", || {

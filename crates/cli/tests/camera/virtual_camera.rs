@@ -152,7 +152,7 @@ fn a_hundred_writers_come_and_go() {
                 .unwrap()
                 .open(&options)
                 .unwrap_or_else(|error| panic!("{version}, {turn}: {error}"));
-            let _ = sink.put(&picture, 0).unwrap();
+            let _ = sink.write_frame(&picture, 0).unwrap();
             let mut reader = open(VIRTUAL, wish((64, 48), 30.0, yuyv()));
             // Every other writer sends a picture that is already YUYV.
             let is_yuyv = turn % 2 == 1;
@@ -163,11 +163,11 @@ fn a_hundred_writers_come_and_go() {
             until("the reader sees it", || {
                 ready.resize(64, 48);
                 ready.bytes.as_chunks_mut().0.fill([(u32::from(code) * 220 / 256 + 16) as u8, 128]);
-                let _ = if is_yuyv { sink.put_yuyv(&mut ready, 0) } else { sink.put(&picture, 0) }.unwrap();
+                let _ = if is_yuyv { sink.write_yuyv(&mut ready, 0) } else { sink.write_frame(&picture, 0) }.unwrap();
                 frame_now(&mut reader).is_some_and(seen)
             });
             drop(reader);
-            sink.finish(Ending::Whole).unwrap();
+            sink.finish(Ending::Complete).unwrap();
             let node = list_nodes().into_iter().find(|node| node.path.to_str() == Some(VIRTUAL)).unwrap();
             assert!(node.outputs, "{version}, {turn}: it takes no more writers");
         }

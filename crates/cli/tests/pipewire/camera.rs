@@ -108,11 +108,11 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
     for number in (0..PICTURES).cycle().take(600) {
         let picture = picture(number);
         let flow = if number % 2 == 0 {
-            sink.put(&picture, 0)
+            sink.write_frame(&picture, 0)
         } else {
             ready.resize(SIZE.0, SIZE.1);
             ready.bytes.copy_from_slice(&yuyv(&picture));
-            sink.put_yuyv(&mut ready, 0)
+            sink.write_yuyv(&mut ready, 0)
         };
         assert!(flow.unwrap().is_continue());
         if !reader.is_reading() {

@@ -93,8 +93,8 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
     let mut reader = Other::start("timed");
     let put = |sink: &mut PipeWire| {
         let now_ns = clock.now_ns();
-        sink.captured(now_ns);
-        let _ = sink.put(&picture, 0).unwrap();
+        sink.set_capture_time(now_ns);
+        let _ = sink.write_frame(&picture, 0).unwrap();
         now_ns
     };
     // Wait for the reader.
@@ -105,7 +105,7 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
     });
     let (mut delays_ns, mut by_itself) = (Vec::new(), 0);
     while delays_ns.len() < PICTURES {
-        let count = sink.nodes().remove(0);
+        let count = sink.node_counters().remove(0);
         let before = count();
         let put_ns = put(&mut sink);
         // The next picture follows only after this one; only a repeat may come between, if it is late.

@@ -22,7 +22,7 @@ use clap::Parser;
 
 use claims::{BUDGET, Case};
 use play::Score;
-use rivals::{Oracle, Picker, Threshold};
+use rivals::{LevelRule, OracleRule, ThresholdRule};
 
 /// The governor of the quality ladder on a simulated machine, beside other rules
 ///
@@ -39,7 +39,7 @@ Examples:
 )]
 struct Options {
     /// Seeds of the machine, FIRST-LAST: rules were tuned on 1-20
-    #[arg(long, value_name = "RANGE", default_value = "101-140", value_parser = seeds)]
+    #[arg(long, value_name = "RANGE", default_value = "101-140", value_parser = parse_seeds)]
     seeds: std::ops::RangeInclusive<u64>,
     /// Simulated minutes of each seed, at 30 frames a second
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=600))]
@@ -67,31 +67,32 @@ fn main() -> ExitCode {
 }
 
 /// Plays a case by every rule and prints its table; returns whether the governor meets its claims.
-fn measure(case: &Case, options: &Options) -> bool {
+fn compare_rules(case: &Case, options: &Options) -> bool {
     let costs = case.costs();
-    let run = |make: &dyn Fn(&[f64]) -> Box<dyn Picker>| case.play(options.seeds.clone(), options.minutes, make);
-    let threshold = run(&|known| Box::new(Threshold::new(known.len(), BUDGET)));
-    let oracle = run(&|_| Box::new(Oracle { costs: costs.clone(), budget: BUDGET }));
-    let outcome = case.measure(options.seeds.clone(), options.minutes);
+    let run = |make: &dyn Fn(&[f64]) -> Box<dyn LevelRule>| case.simulate(options.seeds.clone(), options.minutes, make);
+    let threshold = run(&|known| Box::new(ThresholdRule::new(known.len(), BUDGET)));
+    let oracle = run(&|_| Box::new(OracleRule { costs: costs.clone(), budget: BUDGET }));
+    let outcome = case.compare_with_pid(options.seeds.clone(), options.minutes);
 
     let title = format!("{}: seeds {:?}, {} minutes each", case.name, options.seeds, options.minutes);
     let head = ["rule", "misses %", "mean quality", "switches/min", "settled after a rise: p50, p95", "after a fall"];
     if options.markdown {
         println!("{title}\n\n| {} |\n|{}", head.join(" | "), "---|".repeat(head.len()));
     } else {
-        println!("{title}\n{}", row(&head.map(String::from), false));
+        println!("{title}\n{}", format_row(&head.map(String::from), false));
     }
     let line = |name: &str, score: &Score| {
-        let settled = |fell: bool| format!("{}, {}", score.settled(fell, 0.5), score.settled(fell, 0.95));
+        let settled =
+            |fell: bool| format!("{}, {}", score.settling_frames(fell, 0.5), score.settling_frames(fell, 0.95));
         let cells = [
             name.to_string(),
-            format!("{:.2}", 100.0 * score.misses()),
-            format!("{:.4}", score.quality()),
+            format!("{:.2}", 100.0 * score.miss_fraction()),
+            format!("{:.4}", score.mean_quality()),
             format!("{:.1}", score.switches_per_minute()),
             settled(false),
             settled(true),
         ];
-        println!("{}", row(&cells, options.markdown));
+        println!("{}", format_row(&cells, options.markdown));
     };
     line("threshold 75/100 %", &threshold);
     for (headroom, score) in outcome.pids.iter().filter(|(headroom, _)| (headroom * 20.0).round() % 2.0 == 0.0) {
@@ -100,13 +101,13 @@ fn measure(case: &Case, options: &Options) -> bool {
     line("governor", &outcome.ours);
     line("oracle", &oracle);
     let equal = outcome.equal.map_or("above all its headrooms".to_string(), |quality| format!("{quality:.4}"));
-    let broken = case.broken(&outcome);
+    let broken = case.find_violations(&outcome);
     let verdict = if broken.is_empty() { "kept".to_string() } else { format!("broken: {}", broken.join("; ")) };
     println!("\nThe PID's quality at the governor's misses: {equal}. What is claimed is {verdict}.\n");
     broken.is_empty()
 }
 
-fn row(cells: &[String], markdown: bool) -> String {
+fn format_row(cells: &[String], markdown: bool) -> String {
     if markdown {
         return format!("| {} |", cells.join(" | "));
     }
@@ -114,7 +115,7 @@ fn row(cells: &[String], markdown: bool) -> String {
     cells.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect::<String>().trim_end().to_string()
 }
 
-fn seeds(text: &str) -> Result<std::ops::RangeInclusive<u64>, String> {
+fn parse_seeds(text: &str) -> Result<std::ops::RangeInclusive<u64>, String> {
     let bad = || "use FIRST-LAST, such as 101-140".to_string();
     let (first, last) = text.split_once('-').ok_or_else(bad)?;
     let range = first.parse().map_err(|_| bad())?..=last.parse().map_err(|_| bad())?;

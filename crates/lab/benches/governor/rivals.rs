@@ -7,66 +7,66 @@ const UNIT_NS: f64 = 1e6;
 const PERIOD_NS: u64 = 33_333_333;
 
 /// A rule that picks quality levels.
-pub trait Picker {
-    /// Notes that a frame at `rung` took `took`; frame `now` comes next.
-    fn record(&mut self, rung: usize, took: f64, now: usize);
+pub trait LevelRule {
+    /// Notes that a frame at `level` took `took`; frame `now` comes next.
+    fn record(&mut self, level: usize, took: f64, now: usize);
     /// Returns the level of the next frame; `load` is its true load, for the oracle alone.
-    fn rung(&mut self, load: f64) -> usize;
+    fn choose_level(&mut self, load: f64) -> usize;
 }
 
 /// The project's own governor.
-pub struct Ours {
+pub struct GovernorRule {
     governor: Governor<1>,
     budget_ns: u64,
 }
 
-impl Ours {
+impl GovernorRule {
     /// Creates it with assumed costs, which may differ from the true ones.
     pub fn new(costs: &[f64], budget: f64) -> Self {
         Self { governor: Governor::new(costs, costs.len() / 2), budget_ns: (budget * UNIT_NS) as u64 }
     }
 }
 
-impl Picker for Ours {
-    fn record(&mut self, rung: usize, took: f64, now: usize) {
+impl LevelRule for GovernorRule {
+    fn record(&mut self, level: usize, took: f64, now: usize) {
         let at_ns = now as u64 * PERIOD_NS;
-        self.governor.record(Sample { level: rung, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
+        self.governor.record(Sample { level, took_ns: (took * UNIT_NS) as u64, at_ns }, self.budget_ns);
     }
-    fn rung(&mut self, _: f64) -> usize {
+    fn choose_level(&mut self, _: f64) -> usize {
         self.governor.level()
     }
 }
 
 /// One level down above the budget, one up below three quarters of it.
-pub struct Threshold {
-    rung: usize,
-    rungs: usize,
+pub struct ThresholdRule {
+    level: usize,
+    levels: usize,
     budget: f64,
 }
 
-impl Threshold {
+impl ThresholdRule {
     /// Begins at the middle level.
-    pub fn new(rungs: usize, budget: f64) -> Self {
-        Self { rung: rungs / 2, rungs, budget }
+    pub fn new(levels: usize, budget: f64) -> Self {
+        Self { level: levels / 2, levels, budget }
     }
 }
 
-impl Picker for Threshold {
+impl LevelRule for ThresholdRule {
     fn record(&mut self, _: usize, took: f64, _: usize) {
         if took > self.budget {
-            self.rung = self.rung.saturating_sub(1);
+            self.level = self.level.saturating_sub(1);
         } else if took < 0.75 * self.budget {
-            self.rung = (self.rung + 1).min(self.rungs - 1);
+            self.level = (self.level + 1).min(self.levels - 1);
         }
     }
-    fn rung(&mut self, _: f64) -> usize {
-        self.rung
+    fn choose_level(&mut self, _: f64) -> usize {
+        self.level
     }
 }
 
 /// The controller of Filament's dynamic resolution, with its gains: a scale follows the error of the median of nine
 /// frames against the budget less a headroom, and the level is the finest that costs no more than the scale.
-pub struct Pid {
+pub struct PidRule {
     costs: Vec<f64>,
     target: f64,
     recent: Window<9>,
@@ -75,7 +75,7 @@ pub struct Pid {
     last_error: f64,
 }
 
-impl Pid {
+impl PidRule {
     const P: f64 = 0.118;
     const I: f64 = 0.002;
     const D: f64 = 0.0;
@@ -91,7 +91,7 @@ impl Pid {
     }
 }
 
-impl Picker for Pid {
+impl LevelRule for PidRule {
     fn record(&mut self, _: usize, took: f64, _: usize) {
         self.recent.push(took);
         let error = (self.target - self.recent.median(9)) / self.target;
@@ -105,22 +105,22 @@ impl Picker for Pid {
         self.last_error = error;
         self.scale = (self.scale * (1.0 + out)).clamp(least, most);
     }
-    fn rung(&mut self, _: f64) -> usize {
+    fn choose_level(&mut self, _: f64) -> usize {
         self.costs.iter().rposition(|&cost| cost <= self.scale * 1.000_001).unwrap_or(0)
     }
 }
 
 /// Knows the time of each frame in advance, noise included: the upper bound for any rule.
-pub struct Oracle {
+pub struct OracleRule {
     /// The true costs.
     pub costs: Vec<f64>,
     /// The budget.
     pub budget: f64,
 }
 
-impl Picker for Oracle {
+impl LevelRule for OracleRule {
     fn record(&mut self, _: usize, _: f64, _: usize) {}
-    fn rung(&mut self, load: f64) -> usize {
+    fn choose_level(&mut self, load: f64) -> usize {
         self.costs.iter().rposition(|&cost| cost * load <= self.budget).unwrap_or(0)
     }
 }

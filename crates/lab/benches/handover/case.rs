@@ -21,7 +21,7 @@ pub enum Case {
 
 const POLLED_RATE: u32 = 1000;
 /// At full speed, one send and one hand-over in this number is recorded.
-const KEPT: u64 = 64;
+const SAMPLING_INTERVAL: u64 = 64;
 /// Niceness of the reader in [`Case::Polled`].
 const LOWEST_PRIORITY: i32 = 19;
 
@@ -49,13 +49,13 @@ struct Item {
 }
 
 /// Measures for `time`, and adds to `times`.
-pub fn turn(case: Case, link: Link, rate: u32, time: Duration, times: &mut Times) {
+pub fn measure_turn(case: Case, link: Link, rate: u32, time: Duration, times: &mut Times) {
     match link {
         Link::LockFree => {
             let (mut to, mut from) = live();
             let send = move |item| _ = to.send(item);
             if case == Case::Polled {
-                run(case, rate, time, times, send, move || polled(|| from.try_recv()));
+                run(case, rate, time, times, send, move || poll_until_some(|| from.try_recv()));
             } else {
                 run(case, rate, time, times, send, move || from.recv().expect("an item, until the last"));
             }
@@ -64,7 +64,7 @@ pub fn turn(case: Case, link: Link, rate: u32, time: Duration, times: &mut Times
             let (to, from) = Locked::pair();
             let send = move |item| _ = to.send(item);
             if case == Case::Polled {
-                run(case, rate, time, times, send, move || polled(|| from.try_recv()));
+                run(case, rate, time, times, send, move || poll_until_some(|| from.try_recv()));
             } else {
                 run(case, rate, time, times, send, move || from.recv());
             }
@@ -72,7 +72,7 @@ pub fn turn(case: Case, link: Link, rate: u32, time: Duration, times: &mut Times
     }
 }
 
-fn polled(mut look: impl FnMut() -> Option<Item>) -> Item {
+fn poll_until_some(mut look: impl FnMut() -> Option<Item>) -> Item {
     loop {
         if let Some(item) = look() {
             return item;
@@ -88,9 +88,9 @@ fn run(
     mut send: impl FnMut(Item),
     mut receive: impl FnMut() -> Item + Send,
 ) {
-    let (period, kept) = match case {
+    let (period, interval) = match case {
         Case::Paced => (Some(Duration::from_secs(1) / rate), 1),
-        Case::FullSpeed => (None, KEPT),
+        Case::FullSpeed => (None, SAMPLING_INTERVAL),
         Case::Polled => (Some(Duration::from_secs(1) / POLLED_RATE), 1),
     };
     let Times { sent, hand_over_ns, send_ns } = times;
@@ -103,7 +103,7 @@ fn run(
             loop {
                 let item = receive();
                 let took = item.sent.elapsed();
-                if received % kept == 0 {
+                if received % interval == 0 {
                     hand_over_ns.push(took.as_nanos() as u64);
                 }
                 received += 1;
@@ -125,7 +125,7 @@ fn run(
             send(Item { sent: sent_at, last, _handles: [number; 12] });
             let took = sent_at.elapsed();
             slowest = slowest.max(took);
-            if number % kept == 0 {
+            if number % interval == 0 {
                 send_ns.push(took.as_nanos() as u64);
             }
             if last {

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 
-use case::{Case, Link, Load, Times, turn};
+use case::{Case, Link, Load, Times, measure_turn};
 use options::Options;
 
 fn main() {
@@ -25,7 +25,7 @@ fn main() {
     println!("{cores} cores; load: {busy} busy threads; {} s each, in {} turns", options.seconds, options.turns);
     let (between, edge) = if options.markdown { (" | ", "| ") } else { ("  ", "") };
     let print = |cells: [String; 10]| println!("{edge}{}", cells.join(between) + edge.trim_start_matches("| "));
-    print(heading());
+    print(table_header());
     if options.markdown {
         println!("|{}", "---|".repeat(10));
     }
@@ -36,18 +36,18 @@ fn main() {
             let time = Duration::from_secs(options.seconds.into()) / options.turns;
             for _ in 0..options.turns {
                 for (link, times) in [Link::LockFree, Link::Locked].into_iter().zip(&mut times) {
-                    turn(case, link, options.rate, time, times);
+                    measure_turn(case, link, options.rate, time, times);
                 }
             }
             drop(load);
             for (link, times) in [Link::LockFree, Link::Locked].into_iter().zip(times) {
-                print(line(case, threads > 0, link, times));
+                print(format_row(case, threads > 0, link, times));
             }
         }
     }
 }
 
-fn heading() -> [String; 10] {
+fn table_header() -> [String; 10] {
     [
         format!("{:<10}", "case"),
         "load".into(),
@@ -62,7 +62,7 @@ fn heading() -> [String; 10] {
     ]
 }
 
-fn line(case: Case, loaded: bool, link: Link, times: Times) -> [String; 10] {
+fn format_row(case: Case, loaded: bool, link: Link, times: Times) -> [String; 10] {
     let Times { sent, mut hand_over_ns, mut send_ns } = times;
     hand_over_ns.sort_unstable();
     send_ns.sort_unstable();
@@ -76,17 +76,17 @@ fn line(case: Case, loaded: bool, link: Link, times: Times) -> [String; 10] {
         format!("{:<4}", if loaded { "busy" } else { "idle" }),
         format!("{link:<9}"),
         format!("{sent:>10}"),
-        format!("{:>16}", share_us(&hand_over_ns, 0.5)),
-        format!("{:>8}", share_us(&hand_over_ns, 0.99)),
-        format!("{:>8}", share_us(&hand_over_ns, 1.0)),
-        format!("{:>11}", share_us(&send_ns, 0.5)),
-        format!("{:>8}", share_us(&send_ns, 0.99)),
-        format!("{:>8}", share_us(&send_ns, 1.0)),
+        format!("{:>16}", quantile_us(&hand_over_ns, 0.5)),
+        format!("{:>8}", quantile_us(&hand_over_ns, 0.99)),
+        format!("{:>8}", quantile_us(&hand_over_ns, 1.0)),
+        format!("{:>11}", quantile_us(&send_ns, 0.5)),
+        format!("{:>8}", quantile_us(&send_ns, 0.99)),
+        format!("{:>8}", quantile_us(&send_ns, 1.0)),
     ]
 }
 
-/// Returns the quantile `share` of the sorted times, in microseconds.
-fn share_us(sorted_ns: &[u64], share: f64) -> String {
-    let time_ns = sorted_ns[((sorted_ns.len() - 1) as f64 * share).round() as usize];
+/// Returns the quantile `q` of the sorted times, in microseconds.
+fn quantile_us(sorted_ns: &[u64], q: f64) -> String {
+    let time_ns = sorted_ns[((sorted_ns.len() - 1) as f64 * q).round() as usize];
     format!("{:.2}", time_ns as f64 / 1e3)
 }

@@ -1,7 +1,7 @@
 //! Depth maps with the errors of real sensors.
 
 use super::picture::Plane;
-use super::texture::Dice;
+use super::texture::Rng;
 
 /// The error of a depth map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,24 +51,24 @@ impl Damage {
         let is = |damage| self == damage || self == Damage::All;
         let mut damaged = coc_px.clone();
         if is(Damage::Fat) {
-            damaged = fattened(&damaged);
+            damaged = fatten_foreground(&damaged);
         }
         if is(Damage::Coarse) {
-            damaged = coarsened(&damaged);
+            damaged = resample_coarse(&damaged);
         }
         if is(Damage::Noise) {
-            let noise = noise(damaged.width, damaged.height, seed);
+            let noise = correlated_noise(damaged.width, damaged.height, seed);
             damaged.data.iter_mut().zip(noise.data).for_each(|(c, noise)| *c += noise);
         }
-        let known = if is(Damage::Holes) { holes(coc_px, seed) } else { coc_px.map(|_| true) };
+        let known = if is(Damage::Holes) { mark_known_pixels(coc_px, seed) } else { coc_px.map(|_| true) };
         (damaged, known)
     }
 }
 
 /// Returns normal noise, correlated, with the standard deviation [`NOISE_PX`].
-pub fn noise(width: usize, height: usize, seed: u64) -> Plane<f32> {
-    let mut dice = Dice::new(seed);
-    let white = Plane { width, height, data: (0..width * height).map(|_| dice.normal()).collect::<Vec<_>>() };
+pub fn correlated_noise(width: usize, height: usize, seed: u64) -> Plane<f32> {
+    let mut rng = Rng::new(seed);
+    let white = Plane { width, height, data: (0..width * height).map(|_| rng.normal()).collect::<Vec<_>>() };
     let reach = (3.0 * CORRELATION_PX) as i32;
     let taps: Vec<(i32, f32)> =
         (-reach..=reach).map(|d| (d, (-0.5 * (d as f32 / CORRELATION_PX).powi(2)).exp())).collect();
@@ -82,7 +82,7 @@ pub fn noise(width: usize, height: usize, seed: u64) -> Plane<f32> {
     along(&along(&white, 1, 0), 0, 1).map(|value| value * scale * NOISE_PX)
 }
 
-fn fattened(coc_px: &Plane<f32>) -> Plane<f32> {
+fn fatten_foreground(coc_px: &Plane<f32>) -> Plane<f32> {
     let nearest = |of: &Plane<f32>, dx: i32, dy: i32| {
         Plane::from_fn(of.width, of.height, |x, y| {
             (-FAT_PX..=FAT_PX).map(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)).fold(f32::INFINITY, f32::min)
@@ -91,7 +91,7 @@ fn fattened(coc_px: &Plane<f32>) -> Plane<f32> {
     nearest(&nearest(coc_px, 1, 0), 0, 1)
 }
 
-fn coarsened(coc_px: &Plane<f32>) -> Plane<f32> {
+fn resample_coarse(coc_px: &Plane<f32>) -> Plane<f32> {
     let (width, height) = (coc_px.width.div_ceil(COARSE), coc_px.height.div_ceil(COARSE));
     let half = COARSE / 2;
     let small = Plane::from_fn(width, height, |x, y| coc_px.at((x * COARSE + half) as i32, (y * COARSE + half) as i32));
@@ -113,9 +113,9 @@ pub fn is_edge(coc_px: &Plane<f32>, x: i32, y: i32) -> bool {
 }
 
 /// Returns which pixels are known.
-fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
+fn mark_known_pixels(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
     let (width, height) = (coc_px.width as i32, coc_px.height as i32);
-    let mut dice = Dice::new(seed ^ 0x00C0_FFEE);
+    let mut rng = Rng::new(seed ^ 0x00C0_FFEE);
     let mut known = coc_px.map(|_| true);
     let edges: Vec<(i32, i32)> =
         (0..width * height).map(|k| (k % width, k / width)).filter(|&(x, y)| is_edge(coc_px, x, y)).collect();
@@ -124,11 +124,11 @@ fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
     while left > 0 {
         at_edge = !at_edge && !edges.is_empty();
         let (x, y) = if at_edge {
-            edges[(dice.roll() * edges.len() as f32) as usize]
+            edges[(rng.next() * edges.len() as f32) as usize]
         } else {
-            ((dice.roll() * width as f32) as i32, (dice.roll() * height as f32) as i32)
+            ((rng.next() * width as f32) as i32, (rng.next() * height as f32) as i32)
         };
-        let radius = dice.between(2.0, 6.0) as i32;
+        let radius = rng.between(2.0, 6.0) as i32;
         for (dx, dy) in (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy))) {
             let (x, y) = (x + dx, y + dy);
             if dx * dx + dy * dy <= radius * radius && (0..width).contains(&x) && (0..height).contains(&y) {
@@ -142,7 +142,7 @@ fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
 }
 
 /// Fills unknown pixels (0) with the value of the nearest known one, by two chamfer sweeps (Borgefors 1986).
-pub fn filled_nearest(metres: &Plane<f32>) -> Plane<f32> {
+pub fn fill_from_nearest(metres: &Plane<f32>) -> Plane<f32> {
     const FAR: f32 = 1e9;
     let (width, height) = (metres.width as i32, metres.height as i32);
     let mut filled = metres.map(|z_m| (z_m, if z_m > 0.0 && z_m.is_finite() { 0.0 } else { FAR }));

@@ -36,14 +36,15 @@ const RGB: [[f32; 3]; 3] = [
 type Vec3 = [f32; 3];
 
 /// Returns the mean FLIP over the picture.
-pub fn flip(a: &ColorImage, b: &ColorImage) -> f64 {
-    let (a, b) = (opponent(a), opponent(b));
-    let (lab_a, lab_b) = (perceived(&a), perceived(&b));
-    let (features_a, features_b) = (features(&a), features(&b));
-    let most = hyab(hunt(lab([0.0, 1.0, 0.0])), hunt(lab([0.0, 0.0, 1.0]))).powf(COLOR_EXPONENT);
+pub fn mean_flip(a: &ColorImage, b: &ColorImage) -> f64 {
+    let (a, b) = (to_opponent_space(a), to_opponent_space(b));
+    let (lab_a, lab_b) = (filter_by_contrast_sensitivity(&a), filter_by_contrast_sensitivity(&b));
+    let (features_a, features_b) = (detect_features(&a), detect_features(&b));
+    let most = hyab_distance(adjust_by_hunt(rgb_to_lab([0.0, 1.0, 0.0])), adjust_by_hunt(rgb_to_lab([0.0, 0.0, 1.0])))
+        .powf(COLOR_EXPONENT);
     let mut sum = 0.0;
     for k in 0..a.data.len() {
-        let difference = hyab(lab_a.data[k], lab_b.data[k]).powf(COLOR_EXPONENT);
+        let difference = hyab_distance(lab_a.data[k], lab_b.data[k]).powf(COLOR_EXPONENT);
         let knee = KNEE.0 * most;
         let color = if difference < knee {
             KNEE.1 / knee * difference
@@ -58,15 +59,15 @@ pub fn flip(a: &ColorImage, b: &ColorImage) -> f64 {
     sum / a.data.len() as f64
 }
 
-fn times(matrix: &[[f32; 3]; 3], v: Vec3) -> Vec3 {
+fn multiply(matrix: &[[f32; 3]; 3], v: Vec3) -> Vec3 {
     matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 /// Converts the picture to the linear opponent space YCxCz.
-fn opponent(image: &ColorImage) -> Plane<Vec3> {
+fn to_opponent_space(image: &ColorImage) -> Plane<Vec3> {
     let light: Vec<f32> = (0..256).map(|code| srgb_to_linear(code as f32 / 255.0)).collect();
     let pixel = |p: &[u8]| {
-        let xyz = times(&XYZ, [0, 1, 2].map(|k| light[usize::from(p[k])]));
+        let xyz = multiply(&XYZ, [0, 1, 2].map(|k| light[usize::from(p[k])]));
         let [x, y, z] = [0, 1, 2].map(|k| xyz[k] / WHITE[k]);
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     };
@@ -75,7 +76,7 @@ fn opponent(image: &ColorImage) -> Plane<Vec3> {
 }
 
 /// Filters by the contrast sensitivity of the eye at that distance; the result is L*a*b* with Hunt's adjustment.
-fn perceived(image: &Plane<Vec3>) -> Plane<Vec3> {
+fn filter_by_contrast_sensitivity(image: &Plane<Vec3>) -> Plane<Vec3> {
     // Contrast sensitivity: Gaussians a sqrt(pi/b) exp(-pi^2 x^2 / b); yellow-blue is the sum of two.
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
     let gaussian = |b: f32| -> Vec<f32> {
@@ -92,12 +93,12 @@ fn perceived(image: &Plane<Vec3>) -> Plane<Vec3> {
         let cz = (amounts[0] * wide + amounts[1] * narrow) / (amounts[0] + amounts[1]);
         let y = (y + 16.0) / 116.0;
         let xyz = [(cx / 500.0 + y) * WHITE[0], y * WHITE[1], (y - cz / 200.0) * WHITE[2]];
-        hunt(lab(times(&RGB, xyz).map(|light| light.clamp(0.0, 1.0))))
+        adjust_by_hunt(rgb_to_lab(multiply(&RGB, xyz).map(|light| light.clamp(0.0, 1.0))))
     })
 }
 
 /// Returns the strength of edges and of points in the luminance.
-fn features(image: &Plane<Vec3>) -> Plane<[f32; 2]> {
+fn detect_features(image: &Plane<Vec3>) -> Plane<[f32; 2]> {
     let sigma = 0.5 * FEATURE_DEG * PIXELS_PER_DEGREE;
     let radius = (3.0 * sigma).ceil() as i32;
     let places = || (-radius..=radius).map(|d| d as f32);
@@ -142,9 +143,9 @@ fn convolve(
 }
 
 /// Converts linear light to L*a*b*.
-fn lab(rgb: Vec3) -> Vec3 {
+fn rgb_to_lab(rgb: Vec3) -> Vec3 {
     let delta = 6.0f32 / 29.0;
-    let xyz = times(&XYZ, rgb);
+    let xyz = multiply(&XYZ, rgb);
     let [x, y, z] = [0, 1, 2].map(|k| {
         let t = xyz[k] / WHITE[k];
         if t > delta.powi(3) { t.cbrt() } else { t / (3.0 * delta * delta) + 4.0 / 29.0 }
@@ -153,11 +154,11 @@ fn lab(rgb: Vec3) -> Vec3 {
 }
 
 /// Applies Hunt's adjustment: dark colours look less colourful.
-fn hunt([l, a, b]: Vec3) -> Vec3 {
+fn adjust_by_hunt([l, a, b]: Vec3) -> Vec3 {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
 
 /// Returns the HyAB distance: city block between lightness and chroma, Euclidean within chroma.
-fn hyab(p: Vec3, q: Vec3) -> f32 {
+fn hyab_distance(p: Vec3, q: Vec3) -> f32 {
     (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
 }

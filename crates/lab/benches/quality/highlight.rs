@@ -6,7 +6,7 @@ use glam::Vec2;
 
 use super::lens::{Scene, Surface};
 use super::scenes::SIZE;
-use super::texture::{coverage, disc, premultiplied, texture};
+use super::texture::{coverage_from_distance, disc_distance, premultiply, render_texture};
 
 /// CoC radius of the wall and of the light, in pixels.
 pub const COC_PX: f32 = 16.0;
@@ -29,20 +29,20 @@ pub struct Profile {
 }
 
 /// Returns a white light on a dark wall.
-pub fn scene() -> Scene {
+pub fn create_scene() -> Scene {
     let wall = srgb_to_linear(f32::from(WALL) / 255.0);
     let middle = Vec2::new((SIZE.0 - 1) as f32, (SIZE.1 - 1) as f32) / 2.0;
     let of = |p| {
-        let alpha = coverage(disc(p, middle, LIGHT_PX));
-        premultiplied([wall + alpha * (1.0 - wall); 3], 1.0)
+        let alpha = coverage_from_distance(disc_distance(p, middle, LIGHT_PX));
+        premultiply([wall + alpha * (1.0 - wall); 3], 1.0)
     };
-    let surface = Surface { coc_px: COC_PX, slope: Vec2::ZERO, texture: texture(SIZE, 0, of), margin_px: 0 };
+    let surface = Surface { coc_px: COC_PX, slope: Vec2::ZERO, texture: render_texture(SIZE, 0, of), margin_px: 0 };
     let aperture = Default::default();
     Scene { width: SIZE.0, height: SIZE.1, coc_at_infinity_px: 1.25 * COC_PX, aperture, surfaces: vec![surface] }
 }
 
-/// Measures the disc in a picture of [`scene`].
-pub fn profile(image: &ColorImage) -> Profile {
+/// Measures the disc in a picture of [`create_scene`].
+pub fn measure_profile(image: &ColorImage) -> Profile {
     let light = |code: f32| f64::from(srgb_to_linear(code / 255.0));
     let wall = light(f32::from(WALL));
     let (width, middle) = (image.width as usize, Vec2::new((image.width - 1) as f32, (image.height - 1) as f32) / 2.0);

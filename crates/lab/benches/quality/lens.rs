@@ -49,7 +49,7 @@ pub struct Scene {
 }
 
 /// A surface prepared for ray intersection.
-struct Target<'a> {
+struct PreparedSurface<'a> {
     surface: &'a Surface,
     /// CoC at pixel (0, 0).
     origin_px: f32,
@@ -64,7 +64,7 @@ impl Surface {
         self.coc_px + self.slope.dot(p - middle)
     }
 
-    fn target(&self, size: (usize, usize)) -> Target<'_> {
+    fn prepare(&self, size: (usize, usize)) -> PreparedSurface<'_> {
         let (mut low, mut high) = (Vec2::splat(f32::INFINITY), Vec2::splat(f32::NEG_INFINITY));
         for (k, texel) in self.texture.data.iter().enumerate().filter(|(_, texel)| texel[3] > 0.0) {
             let at = Vec2::new((k % self.texture.width) as f32, (k / self.texture.width) as f32);
@@ -77,11 +77,11 @@ impl Surface {
         let below = |low: f32| if low <= 0.0 { -far } else { low - 1.0 };
         let above = |high: f32, last: f32| if high >= last { far } else { high + 1.0 };
         let bounds = [below(low.x), above(high.x, last.x), below(low.y), above(high.y, last.y)];
-        Target { surface: self, origin_px: self.coc_at(Vec2::ZERO, size), bounds }
+        PreparedSurface { surface: self, origin_px: self.coc_at(Vec2::ZERO, size), bounds }
     }
 }
 
-impl Target<'_> {
+impl PreparedSurface<'_> {
     /// Samples the texture bilinearly; `None` where the surface is empty.
     #[inline]
     fn sample(&self, p: Vec2) -> Option<Rgba> {
@@ -111,7 +111,7 @@ impl Scene {
     }
 
     /// Renders an ideal pinhole picture: sharp everywhere, antialiased by a box of one pixel.
-    pub fn pinhole(&self) -> Plane<Rgb> {
+    pub fn render_pinhole(&self) -> Plane<Rgb> {
         let places = (0..PINHOLE_SAMPLES * PINHOLE_SAMPLES).map(|k| {
             let within = |k: usize| (k as f32 + 0.5) / PINHOLE_SAMPLES as f32 - 0.5;
             (Vec2::new(within(k % PINHOLE_SAMPLES), within(k / PINHOLE_SAMPLES)), Vec2::ZERO)
@@ -121,7 +121,7 @@ impl Scene {
 
     /// Renders through the lens: the mean over about `rays` points of the aperture, each with its own offset in the
     /// pixel.
-    pub fn through_lens(&self, rays: usize) -> Plane<Rgb> {
+    pub fn render_thin_lens(&self, rays: usize) -> Plane<Rgb> {
         // Offsets in the pixel follow the R2 sequence (M. Roberts, 2018), which is evenly distributed at any length.
         let within = |k: usize, step: f64| ((k as f64 + 0.5) * step).fract() as f32 - 0.5;
         let point = |(k, u): (usize, glam::DVec2)| {
@@ -134,13 +134,13 @@ impl Scene {
     /// Averages over rays, each an offset in the pixel and a point of the lens.
     fn render(&self, rays: &[(Vec2, Vec2)]) -> Plane<Rgb> {
         assert!(self.surfaces.len() <= MAX_SURFACES, "a scene has at most {MAX_SURFACES} surfaces");
-        let targets: Vec<Target> = self.surfaces.iter().map(|surface| surface.target(self.size())).collect();
+        let targets: Vec<PreparedSurface> = self.surfaces.iter().map(|surface| surface.prepare(self.size())).collect();
         Plane::from_fn(self.width, self.height, |x, y| {
             let mut order: [usize; MAX_SURFACES] = std::array::from_fn(|k| k);
             let mut sum = [0.0; 3];
             for &(place, u) in rays {
                 let p = Vec2::new(x as f32, y as f32) + place;
-                let light = trace(&targets, &mut order[..targets.len()], p, u);
+                let light = trace_ray(&targets, &mut order[..targets.len()], p, u);
                 (0..3).for_each(|k| sum[k] += light[k]);
             }
             sum.map(|sum| sum / rays.len() as f32)
@@ -148,8 +148,8 @@ impl Scene {
     }
 
     /// Returns the CoC of the first surface that covers at least half of each pixel's centre.
-    pub fn coc(&self) -> Plane<f32> {
-        let targets: Vec<Target> = self.surfaces.iter().map(|surface| surface.target(self.size())).collect();
+    pub fn render_coc(&self) -> Plane<f32> {
+        let targets: Vec<PreparedSurface> = self.surfaces.iter().map(|surface| surface.prepare(self.size())).collect();
         Plane::from_fn(self.width, self.height, |x, y| {
             let p = Vec2::new(x as f32, y as f32);
             let covering = targets.iter().filter(|target| target.sample(p).is_some_and(|texel| texel[3] >= 0.5));
@@ -162,7 +162,7 @@ impl Scene {
 /// Returns the light along one ray, front to back. `order` starts as the previous ray's depth order, which is nearly
 /// sorted.
 #[inline]
-fn trace(targets: &[Target], order: &mut [usize], p: Vec2, u: Vec2) -> Rgb {
+fn trace_ray(targets: &[PreparedSurface], order: &mut [usize], p: Vec2, u: Vec2) -> Rgb {
     let mut coc_px = [0.0; MAX_SURFACES];
     for (coc_px, target) in coc_px.iter_mut().zip(targets) {
         let slope = target.surface.slope;

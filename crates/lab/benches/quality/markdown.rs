@@ -21,25 +21,25 @@ const BALANCED: Method = Method::Layered(Quality::Balanced);
 const BEST: Method = Method::Layered(Quality::Best);
 
 /// Returns all tables and the verdict.
-pub fn markdown(results: &Results) -> String {
+pub fn format_report(results: &Results) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
-    let _ = tables(results, &mut text);
-    let _ = portraits(results, &mut text);
-    let _ = situations(results, &mut text);
+    let _ = write_tables(results, &mut text);
+    let _ = write_portraits(results, &mut text);
+    let _ = write_situations(results, &mut text);
     for method in [BALANCED, BEST, Method::Refined] {
-        let _ = verdict(results, method, &mut text);
+        let _ = write_verdict(results, method, &mut text);
     }
     text
 }
 
-fn cell(record: Option<&Record>) -> String {
+fn format_cell(record: Option<&Record>) -> String {
     let Some(record) = record else { return "-".to_owned() };
     let edge = record.edge_db.map_or("-".to_owned(), |edge_db| format!("{edge_db:.1}"));
     format!("{:.2} / {edge} / {:.4} / {:.4}", record.psnr_db, record.ssim, record.flip)
 }
 
-fn portraits(results: &Results, text: &mut String) -> std::fmt::Result {
+fn write_portraits(results: &Results, text: &mut String) -> std::fmt::Result {
     if results.portraits.is_empty() {
         return Ok(());
     }
@@ -52,7 +52,7 @@ fn portraits(results: &Results, text: &mut String) -> std::fmt::Result {
     writeln!(text)
 }
 
-fn situations(results: &Results, text: &mut String) -> std::fmt::Result {
+fn write_situations(results: &Results, text: &mut String) -> std::fmt::Result {
     use super::situations::Outcome;
     if results.situations.is_empty() {
         return Ok(());
@@ -66,7 +66,7 @@ fn situations(results: &Results, text: &mut String) -> std::fmt::Result {
     writeln!(text)
 }
 
-fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
+fn write_tables(results: &Results, text: &mut String) -> std::fmt::Result {
     for (damaged, title) in [(false, "Exact depth"), (true, "Damaged depth")] {
         let cases = results.cases(damaged);
         if cases.is_empty() {
@@ -77,16 +77,17 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
         for &case in &cases {
             let rival = results.best_rival(case);
             let scene = case.1.map_or(case.0.to_owned(), |damage| format!("{}, {damage}", case.0));
-            let rival = rival.map_or("-".to_owned(), |rival| format!("{} ({})", cell(Some(rival)), rival.method));
+            let rival =
+                rival.map_or("-".to_owned(), |rival| format!("{} ({})", format_cell(Some(rival)), rival.method));
             let [gather, balanced, best, refined] =
-                [Method::Gather, BALANCED, BEST, Method::Refined].map(|method| cell(results.of(case, method)));
+                [Method::Gather, BALANCED, BEST, Method::Refined].map(|method| format_cell(results.find(case, method)));
             writeln!(text, "| {scene} | {gather} | {rival} | {balanced} | {best} | {refined} |")?;
         }
         let mean = |of: &dyn Fn(Case) -> Option<Record>| {
             let records: Vec<Record> = cases.iter().filter_map(|&case| of(case)).collect();
-            cell(Record::mean(&records.iter().collect::<Vec<_>>()).as_ref())
+            format_cell(Record::mean(&records.iter().collect::<Vec<_>>()).as_ref())
         };
-        let of = |method| mean(&|case| results.of(case, method).cloned());
+        let of = |method| mean(&|case| results.find(case, method).cloned());
         let rival = mean(&|case| results.best_rival(case).cloned());
         let [gather, balanced, best, refined] = [Method::Gather, BALANCED, BEST, Method::Refined].map(of);
         writeln!(text, "| **mean** | {gather} | {rival} | {balanced} | {best} | {refined} |\n")?;
@@ -107,7 +108,7 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
     if !results.moving.is_empty() {
         writeln!(text, "## What moves\n\n| scene | method | PSNR / edge / SSIM / FLIP |\n|---|---|---|")?;
         for record in &results.moving {
-            writeln!(text, "| {} | {} | {} |", record.scene, record.method, cell(Some(record)))?;
+            writeln!(text, "| {} | {} | {} |", record.scene, record.method, format_cell(Some(record)))?;
         }
         writeln!(text)?;
     }
@@ -123,7 +124,7 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
 }
 
 /// Writes whether `ours` meets each target.
-fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Result {
+fn write_verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Result {
     writeln!(
         text,
         "## Verdict on `{ours}`\n\nPSNR beyond {ONE_CODE_DB} dB, an error of one code value, counts as that.\n"
@@ -138,7 +139,7 @@ fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Resu
         all.filter_map(|case| Some((name(case), of(case)?))).collect()
     };
     let seen = |record: &Record| record.psnr_db.min(ONE_CODE_DB);
-    let psnr = |case, method| results.of(case, method).map(seen);
+    let psnr = |case, method| results.find(case, method).map(seen);
     let over = |list: Vec<(String, f64)>| list.iter().map(|item| item.1).sum::<f64>() / list.len().max(1) as f64;
     let is_clean = |case: &Case| clean.contains(case);
     if !clean.is_empty() {
@@ -150,13 +151,13 @@ fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Resu
         let target = format!("mean at least {ABOVE_BEST_RIVAL_DB} dB above each scene's best rival");
         say(&target, mean >= ABOVE_BEST_RIVAL_DB, format!("{mean:+.2} dB"))?;
         let target = format!("on no scene more than {BELOW_RIVAL_DB} dB below the best rival");
-        let (is_met, found) = listed(on_each, -BELOW_RIVAL_DB, "dB");
+        let (is_met, found) = list_margins(on_each, -BELOW_RIVAL_DB, "dB");
         say(&target, is_met, found)?;
         let ssim = margins(&|c| {
-            let rivals = results.on(c).filter(|record| record.method.is_rival()).map(|record| record.ssim);
-            is_clean(&c).then_some(results.of(c, ours)?.ssim - rivals.reduce(f64::max)?)
+            let rivals = results.records_of(c).filter(|record| record.method.is_rival()).map(|record| record.ssim);
+            is_clean(&c).then_some(results.find(c, ours)?.ssim - rivals.reduce(f64::max)?)
         });
-        let (is_met, found) = listed(ssim, 0.0, "");
+        let (is_met, found) = list_margins(ssim, 0.0, "");
         say("SSIM above every rival on every scene", is_met, found)?;
     }
     if let Some(highlight) = results.highlights.iter().find(|highlight| highlight.method == Some(ours.name())) {
@@ -166,14 +167,14 @@ fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Resu
     }
     let damaged = margins(&|c| (!is_clean(&c)).then_some(psnr(c, ours)? - seen(results.best_rival(c)?)));
     if !damaged.is_empty() {
-        let (is_met, found) = listed(damaged, 0.0, "dB");
+        let (is_met, found) = list_margins(damaged, 0.0, "dB");
         say("damaged depth: never below the best rival with the same depth", is_met, found)?;
     }
     writeln!(text)
 }
 
 /// Returns whether no margin is below `least`, and a list of those below, or the smallest one.
-fn listed(margins: Vec<(String, f64)>, least: f64, unit: &str) -> (bool, String) {
+fn list_margins(margins: Vec<(String, f64)>, least: f64, unit: &str) -> (bool, String) {
     let show =
         |(name, margin): &(String, f64)| format!("{name} {margin:+.*} {unit}", if unit.is_empty() { 4 } else { 2 });
     let below: Vec<&(String, f64)> = margins.iter().filter(|item| item.1 < least).collect();

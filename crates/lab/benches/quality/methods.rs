@@ -16,7 +16,7 @@ use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 
-use super::picture::{Plane, decode, encode};
+use super::picture::{Plane, decode_srgb, encode_srgb};
 use super::{damage, rivals};
 
 /// The product's default softness of the aperture's rim.
@@ -33,15 +33,15 @@ pub enum Method {
     Gather,
     /// This crate's separable gather of rank 3: the paper's plain form.
     Gather3,
-    /// See [`rivals::golden_angle`].
+    /// See [`rivals::golden_angle_blur`].
     GoldenAngle,
-    /// See [`rivals::near_focus_far`].
+    /// See [`rivals::near_focus_far_blur`].
     NearFocusFar,
-    /// See [`rivals::scatter`].
+    /// See [`rivals::scatter_blur`].
     Scatter,
-    /// See [`rivals::gaussian`].
+    /// See [`rivals::gaussian_blur`].
     Gaussian,
-    /// See [`rivals::blended`].
+    /// See [`rivals::blended_blur`].
     Blended,
     /// This crate's layers, by default on the unrefined depth map with filled holes.
     Layered(Quality),
@@ -116,7 +116,7 @@ impl Shot {
     pub fn coc(&self) -> Plane<f32> {
         let (width, height) = (self.depth.width as usize, self.depth.height as usize);
         let metres = Plane { width, height, data: self.depth.metres.clone() };
-        damage::filled_nearest(&metres).map(|z_m| self.lens.coc_px(z_m))
+        damage::fill_from_nearest(&metres).map(|z_m| self.lens.coc_px(z_m))
     }
 }
 
@@ -126,7 +126,7 @@ pub struct Blurrer {
     bokeh: Option<Box<dyn Bokeh>>,
     filler: HoleFiller,
     refiner: Refiner,
-    mending: MapCorrection,
+    correction: MapCorrection,
     matting: Matting,
     background: BackgroundMemory,
     time_ns: u64,
@@ -146,7 +146,7 @@ impl Blurrer {
             Method::Gather3 => (bokeh::Method::Gather, Some(Rank::Terms(3)), 0.0, Quality::Best),
             Method::Layered(quality) => (bokeh::Method::Layered, None, RIM, quality),
             Method::Refined | Method::Remembered => (bokeh::Method::Layered, None, RIM, Quality::default()),
-            _ => return Ok(Self::of(method, None)),
+            _ => return Ok(Self::with_executor(method, None)),
         };
         let settings = Settings {
             coc: CocKind::Depth,
@@ -161,14 +161,14 @@ impl Blurrer {
             near_max_px: shot.lens.max_coc_px,
         };
         let bokeh = bokeh::create_blur(&settings, shot.image.size(), None, None)?;
-        Ok(Self::of(method, Some(bokeh)))
+        Ok(Self::with_executor(method, Some(bokeh)))
     }
 
-    fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
+    fn with_executor(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
         let (filler, refiner) = (HoleFiller::new(), Refiner::new());
         let (matting, background) = (Matting::default(), BackgroundMemory::default());
-        let mending = MapCorrection::default();
-        Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
+        let correction = MapCorrection::default();
+        Self { method, bokeh, filler, refiner, correction, matting, background, time_ns: 0 }
     }
 
     /// Returns the blurred picture.
@@ -176,60 +176,60 @@ impl Blurrer {
     /// # Errors
     /// Fails if this crate's executor fails.
     pub fn blur(&mut self, shot: &Shot) -> Result<ColorImage, BokehError> {
-        let rival = |blur: &dyn Fn() -> Plane<_>| Ok(encode(&blur()));
-        let light = || decode(&shot.image);
+        let rival = |blur: &dyn Fn() -> Plane<_>| Ok(encode_srgb(&blur()));
+        let light = || decode_srgb(&shot.image);
         match self.method {
             Method::None => Ok(shot.image.clone()),
-            Method::GoldenAngle => rival(&|| rivals::golden_angle(&light(), &shot.coc())),
-            Method::NearFocusFar => rival(&|| rivals::near_focus_far(&light(), &shot.coc())),
-            Method::Blended => rival(&|| rivals::blended(&light(), &shot.coc())),
-            Method::Gaussian => rival(&|| rivals::gaussian(&light(), &shot.coc())),
-            Method::Scatter => rival(&|| rivals::scatter(&light(), &shot.coc(), &shot.aperture.shape)),
+            Method::GoldenAngle => rival(&|| rivals::golden_angle_blur(&light(), &shot.coc())),
+            Method::NearFocusFar => rival(&|| rivals::near_focus_far_blur(&light(), &shot.coc())),
+            Method::Blended => rival(&|| rivals::blended_blur(&light(), &shot.coc())),
+            Method::Gaussian => rival(&|| rivals::gaussian_blur(&light(), &shot.coc())),
+            Method::Scatter => rival(&|| rivals::scatter_blur(&light(), &shot.coc(), &shot.aperture.shape)),
             // The gathers get the rivals' input, the layers the product's processed depth map.
             Method::Gather | Method::Gather3 => {
                 let (width, height) = (shot.depth.width as usize, shot.depth.height as usize);
-                let metres = damage::filled_nearest(&Plane { width, height, data: shot.depth.metres.clone() }).data;
+                let metres = damage::fill_from_nearest(&Plane { width, height, data: shot.depth.metres.clone() }).data;
                 self.run(shot, DepthMap { metres, ..shot.depth.clone() })
             }
             Method::Layered(_) => {
                 let mut depth = shot.depth.clone();
                 self.filler.fill_guided(&mut depth, &shot.image);
-                self.layered(shot, depth)
+                self.blur_layered(shot, depth)
             }
             Method::Remembered => {
-                let depth = self.remember(shot);
+                let depth = self.recall_background(shot);
                 self.run(shot, depth)
             }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
-                let mending = Misalignment::measure(&depth, &shot.image)
+                let correction = Misalignment::measure(&depth, &shot.image)
                     .and_then(|misalignment| misalignment.correction(&depth, &shot.image));
-                let mending = mending.unwrap_or_default();
-                if self.mending != mending {
-                    (self.mending, self.refiner) = (mending, Refiner::with_correction(mending));
+                let correction = correction.unwrap_or_default();
+                if self.correction != correction {
+                    (self.correction, self.refiner) = (correction, Refiner::with_correction(correction));
                 }
                 self.refiner.refine(&mut depth, &shot.image, self.time_ns);
                 self.time_ns += PERIOD_NS;
-                self.layered(shot, depth)
+                self.blur_layered(shot, depth)
             }
         }
     }
 
     /// Blurs by the layers, with the matte that every source gets.
-    fn layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
+    fn blur_layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
         self.matting.find_mixed_pixels(&mut depth, &shot.image, shot.lens.inverse_depth_step(matting::MIN_STEP_PX));
         self.run(shot, depth)
     }
 
     /// Updates the memory with a frame that is not blurred.
-    pub fn watch(&mut self, shot: &Shot) {
+    pub fn update_memory(&mut self, shot: &Shot) {
         if self.method == Method::Remembered {
-            self.remember(shot);
+            self.recall_background(shot);
         }
     }
 
     /// Returns the depth of a frame with its matte and the background seen so far.
-    fn remember(&mut self, shot: &Shot) -> DepthMap {
+    fn recall_background(&mut self, shot: &Shot) -> DepthMap {
         let mut depth = shot.depth.clone();
         self.filler.fill_guided(&mut depth, &shot.image);
         let mut workers = ThreadPool::new("matte", 1);

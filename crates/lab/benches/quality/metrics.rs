@@ -9,7 +9,7 @@ use super::picture::Plane;
 const EDGE_BAND_PX: i32 = 12;
 /// Standard deviation and radius of SSIM's window.
 const SSIM_SIGMA: f64 = 1.5;
-const SSIM_REACH: i32 = 5;
+const SSIM_RADIUS: i32 = 5;
 /// CoC radius above which a pixel counts as blurred, in pixels.
 const BLURRED_PX: f32 = 2.0;
 
@@ -32,7 +32,7 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> f64 {
     const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
     let (width, height) = (a.width as usize, a.height as usize);
     let mut taps: Vec<f64> =
-        (-SSIM_REACH..=SSIM_REACH).map(|d| (-0.5 * (f64::from(d) / SSIM_SIGMA).powi(2)).exp()).collect();
+        (-SSIM_RADIUS..=SSIM_RADIUS).map(|d| (-0.5 * (f64::from(d) / SSIM_SIGMA).powi(2)).exp()).collect();
     let total: f64 = taps.iter().sum();
     taps.iter_mut().for_each(|tap| *tap /= total);
     // Borders are mirrored about the border pixel.
@@ -50,7 +50,7 @@ pub fn ssim(a: &ColorImage, b: &ColorImage) -> f64 {
         let mean = |of: &Plane<[f64; 5]>, dx: i32, dy: i32| {
             Plane::from_fn(width, height, |x, y| {
                 let mut sum = [0.0; 5];
-                for (tap, d) in taps.iter().zip(-SSIM_REACH..) {
+                for (tap, d) in taps.iter().zip(-SSIM_RADIUS..) {
                     let at = of.at(mirror(x as i32 + d * dx, width), mirror(y as i32 + d * dy, height));
                     (0..5).for_each(|k| sum[k] += tap * at[k]);
                 }
@@ -83,7 +83,7 @@ pub fn is_blurred(coc_px: &Plane<f32>, at: usize) -> bool {
 }
 
 /// Returns the mean difference of consecutive frames in code values, over the pixels that count.
-pub fn flicker(frames: &[ColorImage], counts: impl Fn(usize) -> bool) -> f64 {
+pub fn mean_flicker(frames: &[ColorImage], counts: impl Fn(usize) -> bool) -> f64 {
     let (mut sum, mut values) = (0.0, 0.0);
     for pair in frames.windows(2) {
         for (k, (a, b)) in pair[0].rgb.iter().zip(&pair[1].rgb).enumerate() {

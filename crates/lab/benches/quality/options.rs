@@ -42,10 +42,10 @@ Examples:
 )]
 pub struct Options {
     /// Scenes to measure [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = scene)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_scene)]
     pub scenes: Vec<&'static str>,
     /// Methods to measure [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_method)]
     pub methods: Vec<Method>,
     /// Parts to measure
     #[arg(
@@ -83,19 +83,19 @@ impl Options {
     }
 
     /// Returns whether a scene is to be measured.
-    pub fn wants(&self, scene: &str) -> bool {
+    pub fn selects_scene(&self, scene: &str) -> bool {
         self.scenes.is_empty() || self.scenes.contains(&scene)
     }
 
     /// Returns the method that the crops show, if it is measured.
-    pub fn shown(&self) -> Option<Method> {
+    pub fn shown_method(&self) -> Option<Method> {
         let default = Method::Layered(Quality::default());
         let methods = self.methods();
         methods.contains(&default).then_some(default).or(methods.last().copied())
     }
 }
 
-fn scene(name: &str) -> Result<&'static str, String> {
+fn parse_scene(name: &str) -> Result<&'static str, String> {
     let kind = KINDS.iter().find(|kind| kind.name == name);
     kind.map(|kind| kind.name).ok_or_else(|| {
         let names: Vec<_> = KINDS.iter().map(|kind| kind.name).collect();
@@ -103,7 +103,7 @@ fn scene(name: &str) -> Result<&'static str, String> {
     })
 }
 
-fn method(name: &str) -> Result<Method, String> {
+fn parse_method(name: &str) -> Result<Method, String> {
     Method::all().into_iter().find(|method| method.name() == name).ok_or_else(|| {
         let names: Vec<_> = Method::all().into_iter().map(Method::name).collect();
         format!("there is no such method: use {}", names.join(", "))

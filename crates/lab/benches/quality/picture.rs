@@ -27,7 +27,7 @@ impl<T: Copy + Send + Sync> Plane<T> {
         T: Default,
     {
         let mut data = vec![T::default(); width * height];
-        by_rows(&mut data, width, |y, row| row.iter_mut().enumerate().for_each(|(x, value)| *value = of(x, y)));
+        for_each_row(&mut data, width, |y, row| row.iter_mut().enumerate().for_each(|(x, value)| *value = of(x, y)));
         Self { width, height, data }
     }
 
@@ -45,7 +45,7 @@ impl<T: Copy + Send + Sync> Plane<T> {
 }
 
 /// Calls `work(y, row)` for every row of `width` values, on all cores.
-pub fn by_rows<T: Send>(data: &mut [T], width: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+pub fn for_each_row<T: Send>(data: &mut [T], width: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     let rows = Mutex::new(data.chunks_exact_mut(width.max(1)).enumerate());
     let next = || rows.lock().ok().and_then(|mut rows| rows.next());
     thread::scope(|scope| {
@@ -60,14 +60,14 @@ pub fn by_rows<T: Send>(data: &mut [T], width: usize, work: impl Fn(usize, &mut 
 }
 
 /// Converts an 8-bit picture to linear light.
-pub fn decode(image: &ColorImage) -> Plane<Rgb> {
+pub fn decode_srgb(image: &ColorImage) -> Plane<Rgb> {
     let light: Vec<f32> = (0..256).map(|code| srgb_to_linear(code as f32 / 255.0)).collect();
     let data = image.rgb.chunks_exact(3).map(|p| [0, 1, 2].map(|k| light[usize::from(p[k])])).collect();
     Plane { width: image.width as usize, height: image.height as usize, data }
 }
 
 /// Encodes light as 8-bit sRGB, clipped at white like a camera.
-pub fn encode(light: &Plane<Rgb>) -> ColorImage {
+pub fn encode_srgb(light: &Plane<Rgb>) -> ColorImage {
     let code = |light: f32| (linear_to_srgb(light.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
     let rgb = light.data.iter().flat_map(|pixel| pixel.map(code)).collect();
     ColorImage { width: light.width as u32, height: light.height as u32, rgb }

@@ -20,7 +20,7 @@ pub struct Record {
     /// The damage of its depth map, if any.
     pub damage: Option<&'static str>,
     /// The method.
-    #[serde(serialize_with = "name")]
+    #[serde(serialize_with = "serialize_method")]
     pub method: Method,
     /// PSNR in dB, sRGB.
     pub psnr_db: f64,
@@ -32,7 +32,7 @@ pub struct Record {
     pub flip: f64,
 }
 
-fn name<S: serde::Serializer>(method: &Method, serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_method<S: serde::Serializer>(method: &Method, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(method.name())
 }
 
@@ -76,10 +76,10 @@ pub struct Results {
 
 impl Record {
     /// The head of the table.
-    pub const HEAD: &'static str = "scene     depth   method            PSNR dB  edge dB    SSIM    FLIP";
+    pub const TABLE_HEADER: &'static str = "scene     depth   method            PSNR dB  edge dB    SSIM    FLIP";
 
     /// Returns a line of the table.
-    pub fn line(&self) -> String {
+    pub fn to_row(&self) -> String {
         let edge = self.edge_db.map_or("-".to_owned(), |edge_db| format!("{edge_db:.2}"));
         format!(
             "{:9} {:7} {:16} {:8.2} {edge:>8} {:7.4} {:7.4}",
@@ -93,7 +93,7 @@ impl Record {
     }
 
     /// Measures a method's picture of a scene with its damage; `band` has the edges of the truth.
-    pub fn of(
+    pub fn score(
         (scene, damage): Case<'static>,
         method: Method,
         picture: &ColorImage,
@@ -107,7 +107,7 @@ impl Record {
             psnr_db: metrics::psnr(picture, truth, None),
             edge_db: Some(metrics::psnr(picture, truth, Some(band))).filter(|db| !db.is_nan()),
             ssim: metrics::ssim(picture, truth),
-            flip: flip::flip(picture, truth),
+            flip: flip::mean_flip(picture, truth),
         }
     }
 
@@ -130,7 +130,7 @@ impl Record {
 
 impl Highlight {
     /// Returns a line of the table.
-    pub fn line(&self) -> String {
+    pub fn to_row(&self) -> String {
         let Profile { ripple_percent, rim_px, lowest_percent } = self.profile;
         let method = self.method.unwrap_or("truth");
         format!(
@@ -141,7 +141,7 @@ impl Highlight {
 
 impl Flicker {
     /// Returns a line of the table.
-    pub fn line(&self) -> String {
+    pub fn to_row(&self) -> String {
         let Self { method, flicker_codes, outline_codes } = self;
         format!("flicker   {method:16} {flicker_codes:6.3} codes, outlines of a noisy picture {outline_codes:6.3}")
     }
@@ -160,18 +160,18 @@ impl Results {
     }
 
     /// Returns the record of a method on a case.
-    pub fn of(&self, case: Case, method: Method) -> Option<&Record> {
-        self.on(case).find(|record| record.method == method)
+    pub fn find(&self, case: Case, method: Method) -> Option<&Record> {
+        self.records_of(case).find(|record| record.method == method)
     }
 
     /// Returns the records of every method on a case.
-    pub fn on(&self, case: Case) -> impl Iterator<Item = &Record> {
+    pub fn records_of(&self, case: Case) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(move |record| (record.scene, record.damage) == case)
     }
 
     /// Returns the rival with the highest PSNR on a case.
     pub fn best_rival(&self, case: Case) -> Option<&Record> {
-        let rivals = self.on(case).filter(|record| record.method.is_rival());
+        let rivals = self.records_of(case).filter(|record| record.method.is_rival());
         rivals.max_by(|a, b| a.psnr_db.total_cmp(&b.psnr_db))
     }
 }

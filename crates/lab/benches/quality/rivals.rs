@@ -6,17 +6,17 @@ use std::f32::consts::PI;
 
 use bokehcam::bokeh::aperture::Shape;
 
-use super::picture::{Plane, Rgb, by_rows};
+use super::picture::{Plane, Rgb, for_each_row};
 
 /// Area-normalised scattering: every pixel spreads over its own disc, without occlusion.
 ///
 /// The classical renderer of BokehMe (Peng et al., CVPR 2022), with its weight
 /// `(0.5 + 0.5 tanh(4 (R - d))) / (R^2 + 0.2)` at distance d; for a polygon d is taken relative to the outline.
-pub fn scatter(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<Rgb> {
+pub fn scatter_blur(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<Rgb> {
     let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())) as i32 + 1;
     let (width, height) = (image.width as i32, image.height as i32);
     let mut out = vec![[0.0; 3]; image.data.len()];
-    by_rows(&mut out, image.width, |y, row| {
+    for_each_row(&mut out, image.width, |y, row| {
         let mut sums = vec![[0f32; 4]; row.len()];
         let y = y as i32;
         for from_y in (y - max_px).max(0)..=(y + max_px).min(height - 1) {
@@ -29,7 +29,7 @@ pub fn scatter(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<
                 }
                 let share = 1.0 / (radius_px * radius_px + 0.2);
                 for dx in (-window).max(-from_x)..=window.min(width - 1 - from_x) {
-                    let inside_px = radius_px - reach_px(shape, dx as f32, dy as f32, coc_px.data[at] < 0.0);
+                    let inside_px = radius_px - support_px(shape, dx as f32, dy as f32, coc_px.data[at] < 0.0);
                     if inside_px < -1.5 {
                         continue;
                     }
@@ -48,7 +48,7 @@ pub fn scatter(image: &Plane<Rgb>, coc_px: &Plane<f32>, shape: &Shape) -> Plane<
 
 /// Returns the distance from the centre in units in which the outline of a radius R lies at R. A near point shows the
 /// shape rotated by 180 degrees.
-fn reach_px(shape: &Shape, dx: f32, dy: f32, near: bool) -> f32 {
+fn support_px(shape: &Shape, dx: f32, dy: f32, near: bool) -> f32 {
     let distance_px = (dx * dx + dy * dy).sqrt();
     let Shape::Polygon { blades, rotation_deg, .. } = *shape else { return distance_px };
     let (half, turn) = (PI / blades as f32, if near { PI } else { 0.0 });
@@ -60,7 +60,7 @@ fn reach_px(shape: &Shape, dx: f32, dy: f32, near: bool) -> f32 {
 /// sample behind the pixel the CoC is limited to twice the pixel's.
 ///
 /// D. Gustafsson, *Bokeh depth of field in a single pass* (2018), also Godot's circular bokeh.
-pub fn golden_angle(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
+pub fn golden_angle_blur(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     /// Distance between samples, in pixels. At 1/3 there are more samples than pixels.
     const PITCH: f32 = 1.0 / 3.0;
     let golden = PI * (3.0 - 5f32.sqrt());
@@ -91,7 +91,7 @@ pub fn golden_angle(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 }
 
 /// Gathering with a Gaussian of the disc's variance, sigma = R/2, cut at 3 sigma: the usual soft background blur.
-pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
+pub fn gaussian_blur(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     gather(
         image,
         |x, y| coc_px.at(x, y).abs(),
@@ -107,12 +107,12 @@ pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 ///
 /// S. Dutta, *Depth-aware blending of smoothed images for bokeh effect generation* (2021), with exact depth in place of
 /// the blending weights that a network derives from it.
-pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
+pub fn blended_blur(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     const COPIES: usize = 3;
     let max_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())).max(1e-3);
     let radius_px = |copy: usize| max_px * copy as f32 / COPIES as f32;
     let copies: Vec<Plane<Rgb>> = (0..=COPIES)
-        .map(|copy| if copy == 0 { image.clone() } else { smoothed(image, 0.5 * radius_px(copy)) })
+        .map(|copy| if copy == 0 { image.clone() } else { smooth_gaussian(image, 0.5 * radius_px(copy)) })
         .collect();
     Plane::from_fn(image.width, image.height, |x, y| {
         let at = y * image.width + x;
@@ -124,7 +124,7 @@ pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 }
 
 /// Applies a separable Gaussian of `sigma_px`, cut at 3 sigma.
-pub fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
+pub fn smooth_gaussian(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
     let reach = (3.0 * sigma_px).ceil() as i32;
     let taps: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma_px).powi(2)).exp()).collect();
     let all: f32 = taps.iter().sum();
@@ -146,12 +146,12 @@ pub fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
 ///
 /// The common form behind K. Takahashi's KinoBokeh, Unity's post-processing stack and K. Garcia (SIGGRAPH 2017), with
 /// exact discs instead of sparse samples or separable filters.
-pub fn near_focus_far(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
+pub fn near_focus_far_blur(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     let disc = |distance_px: f32, radius_px: f32| (radius_px + 0.5 - distance_px).clamp(0.0, 1.0);
     let is_far = |x, y| coc_px.at(x, y).clamp(0.0, 1.0);
     let is_near = |x, y| (-coc_px.at(x, y)).clamp(0.0, 1.0);
     let far = gather(image, |x, y| coc_px.at(x, y).max(0.0), 1.0, is_far, disc);
-    let near_px = largest_around(&coc_px.map(|c| (-c).max(0.0)));
+    let near_px = dilate_max(&coc_px.map(|c| (-c).max(0.0)));
     let near = gather(image, |x, y| near_px.at(x, y), 1.0, is_near, disc);
     Plane::from_fn(image.width, image.height, |x, y| {
         let (at, (x, y)) = (y * image.width + x, (x as i32, y as i32));
@@ -194,7 +194,7 @@ fn gather(
 }
 
 /// Returns the largest value in a square around each pixel, whose radius is the largest value of all.
-fn largest_around(values: &Plane<f32>) -> Plane<f32> {
+fn dilate_max(values: &Plane<f32>) -> Plane<f32> {
     let reach = values.data.iter().copied().fold(0.0, f32::max).ceil() as i32;
     let rows = Plane::from_fn(values.width, values.height, |x, y| {
         (-reach..=reach).map(|d| values.at(x as i32 + d, y as i32)).fold(0.0, f32::max)

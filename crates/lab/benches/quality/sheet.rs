@@ -15,7 +15,7 @@ const GAP: usize = 4;
 const STEP: usize = 20;
 
 /// Reads a PNG file; `None` if it is missing or unreadable.
-pub fn read(file: &Path) -> Option<ColorImage> {
+pub fn read_png(file: &Path) -> Option<ColorImage> {
     let image = image::open(file).ok()?.into_rgb8();
     Some(ColorImage { width: image.width(), height: image.height(), rgb: image.into_raw() })
 }
@@ -24,7 +24,7 @@ pub fn read(file: &Path) -> Option<ColorImage> {
 ///
 /// # Errors
 /// Fails if the file cannot be written.
-pub fn write(file: &Path, image: &ColorImage) -> io::Result<()> {
+pub fn write_png(file: &Path, image: &ColorImage) -> io::Result<()> {
     let picture = RgbImage::from_raw(image.width, image.height, image.rgb.clone());
     picture
         .ok_or(io::ErrorKind::InvalidData)?
@@ -33,7 +33,7 @@ pub fn write(file: &Path, image: &ColorImage) -> io::Result<()> {
 }
 
 /// Returns column and row of the crop where `ours` differs most from the truth.
-fn worst(ours: &ColorImage, truth: &ColorImage) -> (usize, usize) {
+fn find_worst_crop(ours: &ColorImage, truth: &ColorImage) -> (usize, usize) {
     let (width, height) = (ours.width as usize, ours.height as usize);
     let error = |(left, top): (usize, usize)| -> u64 {
         let rows = (top..(top + CROP.1).min(height)).map(|y| {
@@ -50,8 +50,8 @@ fn worst(ours: &ColorImage, truth: &ColorImage) -> (usize, usize) {
 }
 
 /// Returns the crop where `ours` is worst, enlarged: ours, the truth, the rival.
-pub fn crops(ours: &ColorImage, truth: &ColorImage, rival: &ColorImage) -> ColorImage {
-    let (left, top) = worst(ours, truth);
+pub fn draw_crops(ours: &ColorImage, truth: &ColorImage, rival: &ColorImage) -> ColorImage {
+    let (left, top) = find_worst_crop(ours, truth);
     let column = CROP.0 * ZOOM + GAP;
     let mut sheet = ColorImage::new((3 * column - GAP) as u32, (CROP.1 * ZOOM) as u32);
     let wide = sheet.width as usize;
@@ -67,7 +67,7 @@ pub fn crops(ours: &ColorImage, truth: &ColorImage, rival: &ColorImage) -> Color
 }
 
 /// Stacks pictures of one width vertically.
-pub fn stacked(pictures: &[ColorImage]) -> ColorImage {
+pub fn stack_vertically(pictures: &[ColorImage]) -> ColorImage {
     let width = pictures.iter().map(|picture| picture.width).max().unwrap_or(0);
     let rgb: Vec<u8> = pictures
         .iter()

@@ -18,7 +18,7 @@ use bokehcam::network::{self, Runtime, Task};
 use bokehcam_lab::scene::{Scene, Situation, ThinLens, View};
 use serde::Serialize;
 
-use super::masks::with_noise;
+use super::masks::add_camera_noise;
 use super::methods::{Blurrer, Method, Shot};
 use super::metrics;
 use super::picture::Plane;
@@ -50,9 +50,9 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    pub const HEAD: &'static str = "situation  source       missed %  mistaken %  PSNR dB  edge dB";
+    pub const TABLE_HEADER: &'static str = "situation  source       missed %  mistaken %  PSNR dB  edge dB";
 
-    pub fn line(&self) -> String {
+    pub fn to_row(&self) -> String {
         let Self { situation, source, missed, mistaken, psnr_db, edge_db } = self;
         format!("{situation:10} {source:12} {missed:8.2} {mistaken:11.2} {psnr_db:8.2} {edge_db:8.2}")
     }
@@ -60,7 +60,7 @@ impl Outcome {
 
 /// A situation, rendered.
 #[derive(Clone)]
-struct Staged {
+struct RenderedSituation {
     name: String,
     color: ColorImage,
     room: ColorImage,
@@ -76,31 +76,31 @@ struct Staged {
 ///
 /// # Errors
 /// Fails if this crate's executor fails.
-pub fn measure(mut tell: impl FnMut(Outcome)) -> Result<(), BokehError> {
+pub fn measure_situations(mut report: impl FnMut(Outcome)) -> Result<(), BokehError> {
     for situation in Situation::ALL {
-        let staged = stage(situation);
-        let dark = Staged { name: "low light".into(), noise: LOW_LIGHT_NOISE, ..staged.clone() };
+        let rendered = render_situation(situation);
+        let dark = RenderedSituation { name: "low light".into(), noise: LOW_LIGHT_NOISE, ..rendered.clone() };
         let dark = (situation == Situation::Sits).then_some(dark);
-        for staged in [Some(staged), dark].into_iter().flatten() {
-            for (source, depth) in depths(&staged) {
-                tell(outcome(&staged, source, depth)?);
+        for rendered in [Some(rendered), dark].into_iter().flatten() {
+            for (source, depth) in estimate_depths(&rendered) {
+                report(score_depth(&rendered, source, depth)?);
             }
         }
     }
     Ok(())
 }
 
-fn stage(situation: Situation) -> Staged {
+fn render_situation(situation: Situation) -> RenderedSituation {
     let (view, threads) = (View::new(SIZE.0, SIZE.1), core_count());
-    let scene = Scene::of(situation);
+    let scene = Scene::in_situation(situation);
     let (mut color, mut room) = (ColorImage::default(), ColorImage::default());
     let (mut depth, mut ignored) = (DepthMap::default(), DepthMap::default());
     scene.render_pinhole(&view, 0.3, PINHOLE_RAYS, threads, &mut color, &mut depth);
-    Scene::room_of(situation).render_pinhole(&view, 0.3, PINHOLE_RAYS, threads, &mut room, &mut ignored);
+    Scene::empty_room(situation).render_pinhole(&view, 0.3, PINHOLE_RAYS, threads, &mut room, &mut ignored);
     let points = lens_points(&Aperture::default(), LENS_RAYS);
     let focus_m = scene.focus_m();
     let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m, aperture: &points };
-    Staged {
+    RenderedSituation {
         name: situation.name().into(),
         coverage: scene.render_coverage(&view, 0.3, PINHOLE_RAYS, threads),
         truth: scene.render_thin_lens(&view, 0.3, &lens, threads).clipped.to_srgb(),
@@ -113,7 +113,7 @@ fn stage(situation: Situation) -> Staged {
 }
 
 /// Returns the depth of every source, and the exact one.
-fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
+fn estimate_depths(rendered: &RenderedSituation) -> Vec<(&'static str, DepthMap)> {
     let [matte, mono] = [Task::Matte, Task::Mono].map(model);
     let networks = |matte: &Option<PathBuf>, mono: &Option<PathBuf>| {
         SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default(), Runtime::Auto).ok()
@@ -121,7 +121,7 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
     let alone = |networks: Option<SingleCamera>| networks.map(|networks| Box::new(networks) as Box<dyn DepthSource>);
     let with_plate = |companion: Option<SingleCamera>| -> Option<Box<dyn DepthSource>> {
         let companion = companion.map(|networks| Box::new(networks) as Box<dyn Companion>);
-        Some(Box::new(PlateDepth::new(Some(plate(staged)), None, companion)))
+        Some(Box::new(PlateDepth::new(Some(capture_plate(rendered)), None, companion)))
     };
     let mut sources = vec![("plate", with_plate(None))];
     if matte.is_some() {
@@ -135,12 +135,12 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
         sources.push(("matte,mono", alone(networks(&matte, &mono))));
         sources.push(("all three", with_plate(networks(&matte, &mono))));
     }
-    let mut depths = vec![("exact depth", staged.depth.clone())];
+    let mut depths = vec![("exact depth", rendered.depth.clone())];
     for (name, source) in sources {
         let Some(mut source) = source else { continue };
         let mut map = DepthMap::default();
         for frame in 0..FRAMES {
-            let color = with_noise(&staged.color, staged.noise, 100 + frame);
+            let color = add_camera_noise(&rendered.color, rendered.noise, 100 + frame);
             let stamp = Stamp { index: frame as usize, time_ns: frame * 33_333_333, captured_ns: None };
             // A source that fails is not measured.
             if source.read(FrameInput { stamp, color: &color, right: None }, &mut map).is_err() {
@@ -153,10 +153,10 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
 }
 
 /// Captures the plate in the product's way.
-fn plate(staged: &Staged) -> ColorImage {
+fn capture_plate(rendered: &RenderedSituation) -> ColorImage {
     let mut capture = Capture::default();
     (0..)
-        .find_map(|frame| match capture.add_unchecked(&with_noise(&staged.room, staged.noise, frame)) {
+        .find_map(|frame| match capture.add_unchecked(&add_camera_noise(&rendered.room, rendered.noise, frame)) {
             CaptureResult::Finished(plate) => Some(plate),
             CaptureResult::Collecting(_) | CaptureResult::Rejected => None,
         })
@@ -164,40 +164,40 @@ fn plate(staged: &Staged) -> ColorImage {
 }
 
 /// Returns a known network for a task.
-fn model(task: Task) -> Option<PathBuf> {
+fn find_model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
     data.and_then(|data| network::find_best_in(vec![data.join("models")], task)).or_else(|| network::find_best(task))
 }
 
-fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {
+fn score_depth(rendered: &RenderedSituation, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {
     let height = SIZE.1 as usize;
-    let real = Shot::lens(COC_AT_INFINITY_PX, staged.focus_m, height);
+    let real = Shot::lens(COC_AT_INFINITY_PX, rendered.focus_m, height);
     let lens = match depth.subject_m {
         _ if source == "exact depth" => real,
         // Without a mask, the nearest object of a depth network is the subject.
         _ => Shot::lens(COC_AT_INFINITY_PX, DepthMap::SUBJECT_M, height),
     };
     let (mut counts, mut wrong) = ([0.0; 2], [0.0; 2]);
-    for ((metres, true_m), share) in depth.metres.iter().zip(&staged.depth.metres).zip(&staged.coverage.alpha) {
+    for ((metres, true_m), alpha) in depth.metres.iter().zip(&rendered.depth.metres).zip(&rendered.coverage.alpha) {
         let is_sharp = lens.coc_px(*metres).abs() < SHARP_PX;
-        let is_person = *share > 0.5;
+        let is_person = *alpha > 0.5;
         if !is_person && real.coc_px(*true_m).abs() < SHARP_PX {
             continue;
         }
         counts[usize::from(is_person)] += 1.0;
         wrong[usize::from(is_person)] += f64::from(u8::from(is_sharp != is_person));
     }
-    let true_px = staged.depth.metres.iter().map(|&metres| real.coc_px(metres)).collect();
+    let true_px = rendered.depth.metres.iter().map(|&metres| real.coc_px(metres)).collect();
     let edges = metrics::edge_band(&Plane { width: SIZE.0 as usize, height, data: true_px });
-    let image = with_noise(&staged.color, staged.noise, 100 + FRAMES - 1);
+    let image = add_camera_noise(&rendered.color, rendered.noise, 100 + FRAMES - 1);
     let shot = Shot { image, depth, lens, aperture: Aperture::default() };
     let picture = Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)?;
     Ok(Outcome {
-        situation: staged.name.clone(),
+        situation: rendered.name.clone(),
         source,
         missed: 100.0 * wrong[1] / counts[1],
         mistaken: 100.0 * wrong[0] / counts[0],
-        psnr_db: metrics::psnr(&picture, &staged.truth, None),
-        edge_db: metrics::psnr(&picture, &staged.truth, Some(&edges)),
+        psnr_db: metrics::psnr(&picture, &rendered.truth, None),
+        edge_db: metrics::psnr(&picture, &rendered.truth, Some(&edges)),
     })
 }

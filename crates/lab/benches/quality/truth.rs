@@ -8,7 +8,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 
 use super::lens::Scene;
 use super::methods::Shot;
-use super::picture::{Plane, encode};
+use super::picture::{Plane, encode_srgb};
 use super::scenes::FOCUS_M;
 use super::sheet;
 
@@ -31,16 +31,16 @@ pub struct Views {
 ///
 /// # Errors
 /// Fails if the cache cannot be written.
-pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
-    let views = without_truth(scene);
+pub fn load_or_render_views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
+    let views = render_without_truth(scene);
     let max_px = views.coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
     let rays = (RAYS.1 * max_px * max_px).clamp(RAYS.0, RAYS.2) as usize;
-    let file = cache.join(format!("{name}-{:016x}.png", key(scene, rays)));
-    let truth = match sheet::read(&file) {
+    let file = cache.join(format!("{name}-{:016x}.png", cache_key(scene, rays)));
+    let truth = match sheet::read_png(&file) {
         Some(truth) => truth,
         None => {
-            let truth = encode(&scene.through_lens(rays));
-            keep(&truth, &file)?;
+            let truth = encode_srgb(&scene.render_thin_lens(rays));
+            write_atomically(&truth, &file)?;
             truth
         }
     };
@@ -48,11 +48,11 @@ pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
 }
 
 /// Returns the input of the methods, without the truth.
-pub fn without_truth(scene: &Scene) -> Views {
-    let coc_px = scene.coc();
+pub fn render_without_truth(scene: &Scene) -> Views {
+    let coc_px = scene.render_coc();
     let shot = Shot {
-        image: encode(&scene.pinhole()),
-        depth: depth(&coc_px, scene.coc_at_infinity_px),
+        image: encode_srgb(&scene.render_pinhole()),
+        depth: depth_from_coc(&coc_px, scene.coc_at_infinity_px),
         lens: Shot::lens(scene.coc_at_infinity_px, FOCUS_M, scene.height),
         aperture: scene.aperture.clone(),
     };
@@ -60,7 +60,7 @@ pub fn without_truth(scene: &Scene) -> Views {
 }
 
 /// Returns the depth map whose CoC is `coc_px`.
-pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
+pub fn depth_from_coc(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
     let metres = |coc_px: f32| FOCUS_M / (1.0 - coc_px / coc_at_infinity_px).max(1e-3);
     DepthMap {
         width: coc_px.width as u32,
@@ -71,7 +71,7 @@ pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
 }
 
 /// Returns a hash of everything that the truth depends on.
-fn key(scene: &Scene, rays: usize) -> u64 {
+fn cache_key(scene: &Scene, rays: usize) -> u64 {
     let mut hasher = DefaultHasher::new();
     (RENDERER, rays, scene.size(), format!("{:?}", scene.aperture)).hash(&mut hasher);
     for surface in &scene.surfaces {
@@ -84,9 +84,9 @@ fn key(scene: &Scene, rays: usize) -> u64 {
 }
 
 /// Writes to a temporary name first, so that an existing picture is complete.
-fn keep(image: &ColorImage, file: &Path) -> io::Result<()> {
+fn write_atomically(image: &ColorImage, file: &Path) -> io::Result<()> {
     fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
     let part: PathBuf = file.with_extension("part.png");
-    sheet::write(&part, image)?;
+    sheet::write_png(&part, image)?;
     fs::rename(part, file)
 }

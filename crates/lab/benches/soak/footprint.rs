@@ -19,7 +19,7 @@ impl Footprint {
     ///
     /// # Errors
     /// Fails without /proc.
-    pub fn now() -> io::Result<Self> {
+    pub fn measure() -> io::Result<Self> {
         let status = fs::read_to_string("/proc/self/status")?;
         let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
         Ok(Self {
@@ -30,7 +30,7 @@ impl Footprint {
     }
 
     /// Returns whether the footprint is no larger than before, but for the allowed growth.
-    pub fn is_as_flat_as(&self, before: &Self) -> bool {
+    pub fn has_not_grown_since(&self, before: &Self) -> bool {
         self.descriptors <= before.descriptors
             && self.threads <= before.threads
             && self.resident_kb as f64 <= before.resident_kb as f64 * (1.0 + GROWTH)

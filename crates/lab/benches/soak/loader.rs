@@ -34,7 +34,7 @@ impl Drop for Loader {
 }
 
 /// Runs as the other process.
-pub fn load() -> ! {
+pub fn run_load() -> ! {
     // Its standard input ends when the process that started it does.
     thread::spawn(|| {
         let _ = io::stdin().read_to_end(&mut Vec::new());

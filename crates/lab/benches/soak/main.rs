@@ -35,8 +35,8 @@ use clap::Parser;
 
 use footprint::Footprint;
 use loader::Loader;
-use stages::{Looped, PERIOD_NS, Slowed, Stamping, Stamps};
-use verdict::verdict;
+use stages::{LoopedCamera, PERIOD_NS, SlowedBokeh, StampingSink, Stamps};
+use verdict::print_verdict;
 
 /// A recording as a live camera of 30 frames a second, blurred in real time
 ///
@@ -97,7 +97,7 @@ struct Options {
 
 fn main() -> ExitCode {
     if std::env::args().nth(1).as_deref() == Some(loader::ARGUMENT) {
-        loader::load();
+        loader::run_load();
     }
     let options: Options = match common::options() {
         Ok(options) => options,
@@ -119,7 +119,7 @@ fn main() -> ExitCode {
 
 /// Runs the bench; returns whether the criteria are met.
 fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
-    let begun = options.starts == 0 || starts(options)?;
+    let begun = options.starts == 0 || measure_restarts(options)?;
     let frames = (options.minutes * 60e9 / PERIOD_NS as f64).round().max(2.0) as u64;
     let loader = options.loader.then(Loader::start).transpose()?;
     let (report, shown) = replay(options, frames)?;
@@ -136,25 +136,25 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         if options.slow > 1.0 { format!(", blur {} times slower", options.slow) } else { String::new() }
     );
     println!("{report}\n");
-    Ok(verdict(&shown, &report) && begun)
+    Ok(print_verdict(&shown, &report) && begun)
 }
 
 /// Starts and stops repeatedly; returns whether the process holds no more at the end than after a tenth of the starts.
-fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
+fn measure_restarts(options: &Options) -> Result<bool, Box<dyn Error>> {
     const FRAMES: u64 = 4;
-    let (mut warm, mut frames) = (Footprint::now()?, 0);
+    let (mut warm, mut frames) = (Footprint::measure()?, 0);
     for start in 0..options.starts {
         frames += replay(options, FRAMES)?.0.frames.captured;
         if start == options.starts / 10 {
-            warm = Footprint::now()?;
+            warm = Footprint::measure()?;
         }
     }
-    let end = Footprint::now()?;
-    let flat = end.is_as_flat_as(&warm);
+    let end = Footprint::measure()?;
+    let flat = end.has_not_grown_since(&warm);
     println!(
         "{} starts and stops, {frames} frames: {warm}, in the end {end}: {}\n",
         options.starts,
-        verdict::word(flat)
+        verdict::criterion_word(flat)
     );
     Ok(flat)
 }
@@ -181,15 +181,15 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
     let computing = ComputeOptions { backend, ..ComputeOptions::default() };
     let make = |settings: &_| -> Result<Box<dyn Bokeh>, BokehError> {
-        Ok(Box::new(Slowed::new(computing.create_blur(settings, size)?, options.slow)))
+        Ok(Box::new(SlowedBokeh::new(computing.create_blur(settings, size)?, options.slow)))
     };
     let (blurring, _) = BlurSetup::create(look, (size, true), make)?;
     let clock = Clock::system();
-    let stamps = Stamps::with_room_for(frames as usize);
+    let stamps = Stamps::with_capacity(frames as usize);
     let stop = AtomicBool::new(false);
     let depth = Box::new(RecordedDepth::new(Arc::clone(&recording), &name)?);
-    let camera = Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone()));
-    let sink = Box::new(Stamping::new(clock.clone(), stamps.clone()));
+    let camera = Box::new(LoopedCamera::new(recording, &name, frames, clock.clone(), stamps.clone()));
+    let sink = Box::new(StampingSink::new(clock.clone(), stamps.clone()));
     let report = pipeline::run(Run {
         measured: true,
         changes: None,
@@ -198,5 +198,5 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         clock,
         ..Run::with_blur(camera, Some(depth), blurring, sink, &stop)
     })?;
-    Ok((report, stamps.take()))
+    Ok((report, stamps.take_deliveries()))
 }

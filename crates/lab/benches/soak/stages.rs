@@ -27,21 +27,21 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    pub fn with_room_for(frames: usize) -> Self {
+    pub fn with_capacity(frames: usize) -> Self {
         // Written once, so that the system commits the memory now and not during the run.
         let mut shown = vec![(1, 1); frames];
         shown.clear();
         Self { shown: Arc::new(Mutex::new(shown)), ..Self::default() }
     }
 
-    pub fn take(&self) -> Vec<(u64, u64)> {
+    pub fn take_deliveries(&self) -> Vec<(u64, u64)> {
         std::mem::take(&mut self.shown.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 /// Loops a recording as a live camera of 30 frames a second: a frame is captured when it is due, and decoded then; a
 /// frame that is not read within a period is overwritten.
-pub struct Looped {
+pub struct LoopedCamera {
     recording: Arc<Recording>,
     scratch: Scratch,
     name: String,
@@ -51,13 +51,13 @@ pub struct Looped {
     frames: u64,
 }
 
-impl Looped {
+impl LoopedCamera {
     pub fn new(recording: Arc<Recording>, name: &str, frames: u64, clock: Clock, stamps: Stamps) -> Self {
         Self { recording, scratch: Scratch::default(), name: name.to_owned(), clock, stamps, position: 0, frames }
     }
 }
 
-impl Camera for Looped {
+impl Camera for LoopedCamera {
     fn info(&self) -> SourceInfo {
         SourceInfo {
             name: self.name.clone(),
@@ -95,19 +95,19 @@ impl Camera for Looped {
 }
 
 /// An executor that is slower by `factor`, and writes the frame's number into each picture.
-pub struct Slowed {
+pub struct SlowedBokeh {
     inner: Box<dyn Bokeh>,
     factor: f64,
     wasted: Duration,
 }
 
-impl Slowed {
+impl SlowedBokeh {
     pub fn new(inner: Box<dyn Bokeh>, factor: f64) -> Self {
         Self { inner, factor, wasted: Duration::ZERO }
     }
 }
 
-impl Bokeh for Slowed {
+impl Bokeh for SlowedBokeh {
     fn submit(&mut self, job: Job) -> Result<(), BokehError> {
         let began = Instant::now();
         self.inner.submit(job)?;
@@ -147,20 +147,20 @@ impl Bokeh for Slowed {
 }
 
 /// Discards the pictures and records their times.
-pub struct Stamping {
+pub struct StampingSink {
     clock: Clock,
     stamps: Stamps,
     shown: ColorImage,
 }
 
-impl Stamping {
+impl StampingSink {
     pub fn new(clock: Clock, stamps: Stamps) -> Self {
         Self { clock, stamps, shown: ColorImage::default() }
     }
 }
 
-impl Sink for Stamping {
-    fn put(&mut self, picture: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+impl Sink for StampingSink {
+    fn write_frame(&mut self, picture: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let now_ns = self.clock.now_ns() - self.stamps.epoch_ns.load(Ordering::Relaxed);
         let ticket = picture.rgb.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let age_ns = now_ns.saturating_sub(ticket * PERIOD_NS);

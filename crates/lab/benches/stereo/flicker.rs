@@ -8,26 +8,26 @@ use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use serde::Serialize;
 
-use super::options::{Flicker, Options, name};
+use super::options::{Flicker, Options, effort_name};
 use super::quality::picture::Plane;
-use super::sequence::{Frame, Sequence, bundled, euroc, kitti};
-use super::{Outcome, matcher, print};
+use super::sequence::{Frame, Sequence, load_bundled, load_euroc, load_kitti};
+use super::{Outcome, matcher, print_record};
 
 /// Frames at the start of a sequence that are not measured: the memory has little content there.
 const WARM_UP: usize = 2;
 /// With ground truth, a pixel is static if, in the square of radius `STILL_REACH` around it, the true disparity changes
 /// by no more than `STILL_PX` pixels, and each colour by no more than `STILL_CODES` (before noise is added).
-const STILL_PX: f32 = 1.0 / 128.0;
-const STILL_CODES: u8 = 1;
-const STILL_REACH: i32 = 3;
+const STATIC_PX: f32 = 1.0 / 128.0;
+const STATIC_CODES: u8 = 1;
+const STATIC_RADIUS_PX: i32 = 3;
 /// Without ground truth, a pixel is static if the mean change of grey over that square is no more than this, in codes.
-const STILL_MEAN_CODES: f32 = 3.0;
+const STATIC_MEAN_CODES: f32 = 3.0;
 /// A change of more than this, in pixels, counts as a jump.
 const JUMP_PX: f32 = 1.0;
 /// A moving edge is where the true disparity changes by more than `EDGE_PX` pixels, grown by `EDGE_REACH` pixels;
 /// without the leftmost columns, as wide as the disparity range, which the right camera may not see.
 const EDGE_PX: f32 = 1.5;
-const EDGE_REACH: i32 = 5;
+const EDGE_RADIUS_PX: i32 = 5;
 
 /// The scores of one method on one sequence.
 #[derive(Serialize)]
@@ -55,26 +55,26 @@ struct Record {
 /// # Errors
 /// Fails if a recording is unreadable, or a matcher cannot be created or fails.
 pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
-    let mut sequences = vec![bundled()?];
+    let mut sequences = vec![load_bundled()?];
     if let Some(data) = &flicker.data {
-        sequences.extend(kitti(data)?.into_iter().chain(euroc(data)?));
+        sequences.extend(load_kitti(data)?.into_iter().chain(load_euroc(data)?));
     }
     if !options.json {
         println!("sequence  effort step     memory  still %  change px  jumps %   moving bad1 %  error px");
     }
     for mut sequence in sequences {
-        let regions = regions(&sequence);
+        let regions = find_regions(&sequence);
         if sequence.frames[0].truth.is_some() {
             (1..).zip(&mut sequence.frames).for_each(|(seed, frame)| frame.add_noise(flicker.noise, seed));
         }
         for &effort in &options.efforts {
-            let [without, with] = [false, true].map(|memory| maps(&sequence, options, effort, memory));
+            let [without, with] = [false, true].map(|memory| compute_disparities(&sequence, options, effort, memory));
             let (without, with) = (without?, with?);
             for (step, name) in ["matched", "refined"].into_iter().enumerate() {
                 for (memory, maps) in [(false, &without[step]), (true, &with[step])] {
-                    let record = measure(&sequence, &regions, effort, maps);
+                    let record = score_flicker(&sequence, &regions, effort, maps);
                     let record = Record { step: name, memory, ..record };
-                    print(options, &record.line(), &record)?;
+                    print_record(options, &record.to_row(), &record)?;
                 }
             }
         }
@@ -84,10 +84,15 @@ pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
 
 /// Returns the disparities of all frames, as matched and as refined. Without memory, every frame is treated as the
 /// first.
-fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) -> Outcome<[Vec<Plane<f32>>; 2]> {
+fn compute_disparities(
+    sequence: &Sequence,
+    options: &Options,
+    effort: Effort,
+    memory: bool,
+) -> Outcome<[Vec<Plane<f32>>; 2]> {
     let create = || {
         let size = sequence.frames[0].left.size();
-        matcher::create(options, effort, sequence.disparities, size, None)
+        matcher::create_matcher(options, effort, sequence.disparities, size, None)
     };
     let (mut matcher, mut refiner) = (create()?, Refiner::new());
     let mut focus = Focus::new(FocusRule::Auto);
@@ -97,9 +102,9 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
             (matcher, refiner) = (create()?, Refiner::new());
         }
         let mut map = DisparityMap::default();
-        let [left, right] = frame.gray();
+        let [left, right] = frame.to_gray();
         matcher.compute_disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
-        let mut depth = metres(&map, &sequence.rig);
+        let mut depth = disparity_to_depth(&map, &sequence.rig);
         refiner.set_focus(focus.focus_m(&depth, frame.time_ns));
         refiner.refine(&mut depth, &frame.left, frame.time_ns);
         let (width, height) = (map.width as usize, map.height as usize);
@@ -111,7 +116,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
 }
 
 /// Converts a disparity map to depth, in a stream's way.
-pub fn metres(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
+pub fn disparity_to_depth(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
     let mut depth = DepthMap::default();
     source::disparity_to_depth(map, rig, &mut depth);
     depth
@@ -124,61 +129,65 @@ struct Regions {
 }
 
 /// Returns the regions of every frame but the first.
-fn regions(sequence: &Sequence) -> Vec<Regions> {
-    sequence.frames.windows(2).map(|pair| Regions { still: still(&pair[0], &pair[1]), moving: moving(pair) }).collect()
+fn find_regions(sequence: &Sequence) -> Vec<Regions> {
+    sequence
+        .frames
+        .windows(2)
+        .map(|pair| Regions { still: find_static_pixels(&pair[0], &pair[1]), moving: find_moving_edges(pair) })
+        .collect()
 }
 
-fn still(before: &Frame, now: &Frame) -> Plane<bool> {
+fn find_static_pixels(before: &Frame, now: &Frame) -> Plane<bool> {
     let (width, height) = (now.left.width as usize, now.left.height as usize);
     if let (Some(a), Some(b)) = (&before.truth, &now.truth) {
         let differs = Plane::from_fn(width, height, |x, y| {
             let at = y * width + x;
             let codes = before.left.rgb[3 * at..3 * at + 3].iter().zip(&now.left.rgb[3 * at..3 * at + 3]);
-            (a.data[at] - b.data[at]).abs() > STILL_PX || codes.into_iter().any(|(a, b)| a.abs_diff(*b) > STILL_CODES)
+            (a.data[at] - b.data[at]).abs() > STATIC_PX || codes.into_iter().any(|(a, b)| a.abs_diff(*b) > STATIC_CODES)
         });
-        return grown(&differs, STILL_REACH).map(|differs| !differs);
+        return dilate(&differs, STATIC_RADIUS_PX).map(|differs| !differs);
     }
-    let ([a, _], [b, _]) = (before.gray(), now.gray());
+    let ([a, _], [b, _]) = (before.to_gray(), now.to_gray());
     let change =
         Plane::from_fn(width, height, |x, y| f32::from(b.luma[y * width + x]) - f32::from(a.luma[y * width + x]));
     let mean = |of: &Plane<f32>, dx: i32, dy: i32| {
         Plane::from_fn(width, height, |x, y| {
-            let sum: f32 = reach(STILL_REACH).map(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)).sum();
-            sum / reach(STILL_REACH).count() as f32
+            let sum: f32 = window(STATIC_RADIUS_PX).map(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)).sum();
+            sum / window(STATIC_RADIUS_PX).count() as f32
         })
     };
     // The mean of the absolute change: the signed mean is near zero where texture moves.
-    mean(&mean(&change.map(f32::abs), 1, 0), 0, 1).map(|codes| codes <= STILL_MEAN_CODES)
+    mean(&mean(&change.map(f32::abs), 1, 0), 0, 1).map(|codes| codes <= STATIC_MEAN_CODES)
 }
 
-fn moving(pair: &[Frame]) -> Option<Plane<bool>> {
+fn find_moving_edges(pair: &[Frame]) -> Option<Plane<bool>> {
     let (a, b) = (pair[0].truth.as_ref()?, pair[1].truth.as_ref()?);
     let jumps = a.data.iter().zip(&b.data).map(|(a, b)| (a - b).abs() > EDGE_PX).collect();
-    Some(grown(&Plane { width: b.width, height: b.height, data: jumps }, EDGE_REACH))
+    Some(dilate(&Plane { width: b.width, height: b.height, data: jumps }, EDGE_RADIUS_PX))
 }
 
-fn reach(px: i32) -> std::ops::RangeInclusive<i32> {
+fn window(px: i32) -> std::ops::RangeInclusive<i32> {
     -px..=px
 }
 
 /// Dilates by a square of radius `px`.
-fn grown(of: &Plane<bool>, px: i32) -> Plane<bool> {
+fn dilate(of: &Plane<bool>, px: i32) -> Plane<bool> {
     let along = |of: &Plane<bool>, dx: i32, dy: i32| {
-        Plane::from_fn(of.width, of.height, |x, y| reach(px).any(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)))
+        Plane::from_fn(of.width, of.height, |x, y| window(px).any(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)))
     };
     along(&along(of, 1, 0), 0, 1)
 }
 
 /// Computes all scores; the caller sets the step and the memory.
-fn measure(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Plane<f32>]) -> Record {
-    let (mut share, mut change, mut jumps) = <(Mean, Mean, Mean)>::default();
+fn score_flicker(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Plane<f32>]) -> Record {
+    let (mut fraction, mut change, mut jumps) = <(Mean, Mean, Mean)>::default();
     let (mut bad, mut error) = <(Mean, Mean)>::default();
     for index in 1 + WARM_UP..maps.len() {
         let (Regions { still, moving }, now, before) = (&regions[index - 1], &maps[index], &maps[index - 1]);
         let truth = sequence.frames[index].truth.as_ref();
         for at in 0..now.data.len() {
             let change_px = (now.data[at] - before.data[at]).abs();
-            share.add(f32::from(still.data[at]));
+            fraction.add(f32::from(still.data[at]));
             if still.data[at] && change_px.is_finite() {
                 change.add(change_px);
                 jumps.add(f32::from(change_px > JUMP_PX));
@@ -195,13 +204,13 @@ fn measure(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Pla
     }
     Record {
         sequence: sequence.name,
-        effort: name(effort),
+        effort: effort_name(effort),
         step: "",
         memory: false,
-        still_percent: 100.0 * share.value().unwrap_or(f64::NAN),
+        still_percent: 100.0 * fraction.value().unwrap_or(f64::NAN),
         still_change_px: change.value().unwrap_or(f64::NAN),
         still_jumps_percent: 100.0 * jumps.value().unwrap_or(f64::NAN),
-        moving_bad1_percent: bad.value().map(|share| 100.0 * share),
+        moving_bad1_percent: bad.value().map(|fraction| 100.0 * fraction),
         moving_error_px: error.value(),
     }
 }
@@ -224,7 +233,7 @@ impl Mean {
 }
 
 impl Record {
-    fn line(&self) -> String {
+    fn to_row(&self) -> String {
         let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
         format!(
             "{:9} {:6} {:8} {:6} {:8.1} {:10.4} {:8.3} {:>15} {:>9}",

@@ -55,7 +55,7 @@ fn main() -> ExitCode {
 }
 
 /// Prints a line of a table, or of JSON.
-fn print(options: &Options, line: &str, record: &impl serde::Serialize) -> Outcome {
+fn print_record(options: &Options, line: &str, record: &impl serde::Serialize) -> Outcome {
     if options.json {
         println!("{}", serde_json::to_string(record)?);
     } else {

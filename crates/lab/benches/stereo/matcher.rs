@@ -11,7 +11,7 @@ use super::options::Options;
 ///
 /// # Errors
 /// Fails if the matcher cannot be created.
-pub fn create(
+pub fn create_matcher(
     options: &Options,
     effort: Effort,
     disparities: u32,

@@ -23,7 +23,7 @@ pub struct Options {
     #[command(subcommand)]
     pub command: Option<Command>,
     /// Efforts to measure
-    #[arg(long, global = true, value_name = "LIST", value_delimiter = ',', default_value = "full,fast", value_parser = effort)]
+    #[arg(long, global = true, value_name = "LIST", value_delimiter = ',', default_value = "full,fast", value_parser = parse_effort)]
     pub efforts: Vec<Effort>,
     /// Match on a GPU; one whose name contains this, if it is not empty
     #[arg(long, global = true, value_name = "NAME", num_args = 0..=1, default_missing_value = "")]
@@ -60,7 +60,7 @@ pub struct Times {
     #[arg(num_args = 2, value_names = ["LEFT", "RIGHT"])]
     pub pair: Vec<PathBuf>,
     /// Sizes of the bundled pair
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "640x480,1280x720", value_parser = size)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "640x480,1280x720", value_parser = parse_size)]
     pub size: Vec<(u32, u32)>,
     /// Disparities tried: a multiple of 16
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "64", value_parser = value_parser!(u32).range(16..=256))]
@@ -88,7 +88,7 @@ pub struct Flicker {
 #[derive(Args, Debug)]
 pub struct Picture {
     /// Another matcher's disparity of the bundled recording: a folder of NNNNNN.pfm
-    #[arg(long = "rival", value_name = "NAME=DIR", value_parser = rival)]
+    #[arg(long = "rival", value_name = "NAME=DIR", value_parser = parse_rival)]
     pub rivals: Vec<(String, PathBuf)>,
     /// Folder for the blurred pictures
     #[arg(long, value_name = "DIR")]
@@ -96,24 +96,24 @@ pub struct Picture {
 }
 
 /// Returns the name on the product's command line.
-pub fn name(effort: Effort) -> &'static str {
+pub fn effort_name(effort: Effort) -> &'static str {
     match effort {
         Effort::Fast => "fast",
         Effort::Full => "full",
     }
 }
 
-fn effort(text: &str) -> Result<Effort, String> {
-    let found = [Effort::Fast, Effort::Full].into_iter().find(|&effort| name(effort) == text);
+fn parse_effort(text: &str) -> Result<Effort, String> {
+    let found = [Effort::Fast, Effort::Full].into_iter().find(|&effort| effort_name(effort) == text);
     found.ok_or_else(|| "use full or fast".to_owned())
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     sides.filter(|&(width, height)| width > 0 && height > 0).ok_or_else(|| "use WIDTHxHEIGHT".to_owned())
 }
 
-fn rival(text: &str) -> Result<(String, PathBuf), String> {
+fn parse_rival(text: &str) -> Result<(String, PathBuf), String> {
     let (name, folder) = text.split_once('=').ok_or("use NAME=DIR")?;
     Ok((name.to_owned(), folder.into()))
 }

@@ -10,7 +10,7 @@ use bokehcam::optics::StereoRig;
 use super::Outcome;
 use super::quality::picture::Plane;
 use super::quality::sheet;
-use super::quality::texture::Dice;
+use super::quality::texture::Rng;
 
 /// A stereo pair.
 pub struct Frame {
@@ -38,7 +38,7 @@ pub struct Sequence {
 
 impl Frame {
     /// Returns both pictures in grey, the input of matchers.
-    pub fn gray(&self) -> [GrayImage; 2] {
+    pub fn to_gray(&self) -> [GrayImage; 2] {
         [&self.left, &self.right].map(|color| {
             let mut gray = GrayImage::default();
             gray.set_luma_from(color);
@@ -48,15 +48,15 @@ impl Frame {
 
     /// Adds normal noise to both pictures; each seed gives another noise.
     pub fn add_noise(&mut self, codes: f32, seed: u64) {
-        let mut dice = Dice::new(seed);
+        let mut rng = Rng::new(seed);
         for code in self.left.rgb.iter_mut().chain(&mut self.right.rgb) {
-            *code = (f32::from(*code) + codes * dice.normal()).round().clamp(0.0, 255.0) as u8;
+            *code = (f32::from(*code) + codes * rng.normal()).round().clamp(0.0, 255.0) as u8;
         }
     }
 }
 
 /// Returns the path of a file in `recordings/`.
-pub fn recordings(path: &str) -> PathBuf {
+pub fn recording_path(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings").join(path)
 }
 
@@ -65,15 +65,15 @@ pub fn recordings(path: &str) -> PathBuf {
 ///
 /// # Errors
 /// Fails if it is missing.
-pub fn bundled() -> Outcome<Sequence> {
+pub fn load_bundled() -> Outcome<Sequence> {
     const PERIOD_NS: u64 = 83_333_333;
-    let folder = recordings("stereo");
-    let frames = numbered(&folder.join("image_2"))?.into_iter().enumerate().map(|(index, name)| {
-        let truth = disparity_file(&folder.join("disp").join(&name))?;
+    let folder = recording_path("stereo");
+    let frames = list_files(&folder.join("image_2"))?.into_iter().enumerate().map(|(index, name)| {
+        let truth = read_disparity(&folder.join("disp").join(&name))?;
         Ok(Frame {
             time_ns: index as u64 * PERIOD_NS,
-            left: read(&folder.join("image_2").join(&name))?,
-            right: read(&folder.join("image_3").join(&name))?,
+            left: read_color(&folder.join("image_2").join(&name))?,
+            right: read_color(&folder.join("image_3").join(&name))?,
             truth: Some(truth),
         })
     });
@@ -85,16 +85,21 @@ pub fn bundled() -> Outcome<Sequence> {
 ///
 /// # Errors
 /// Fails if a picture is unreadable.
-pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
+pub fn load_kitti(data: &Path) -> Outcome<Option<Sequence>> {
     const PERIOD_NS: u64 = 100_000_000;
     let folder = data.join("stereo_seq/KITTI_sequence_1");
     if !folder.is_dir() {
         return Ok(None);
     }
-    let names = numbered(&folder.join("image_l"))?;
+    let names = list_files(&folder.join("image_l"))?;
     let frames = names.into_iter().enumerate().map(|(index, name)| {
-        let eye = |eye: &str| read(&folder.join(eye).join(&name));
-        Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: eye("image_l")?, right: eye("image_r")?, truth: None })
+        let camera = |camera: &str| read_color(&folder.join(camera).join(&name));
+        Ok(Frame {
+            time_ns: index as u64 * PERIOD_NS,
+            left: camera("image_l")?,
+            right: camera("image_r")?,
+            truth: None,
+        })
     });
     let rig = StereoRig { focal_px: 707.0912, baseline_m: 0.5372, doffs_px: 0.0, metric: true };
     Ok(Some(Sequence { name: "kitti", rig, disparities: 128, frames: frames.collect::<Outcome<_>>()? }))
@@ -104,22 +109,22 @@ pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
 ///
 /// # Errors
 /// Fails if a picture or the calibration is unreadable.
-pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
+pub fn load_euroc(data: &Path) -> Outcome<Option<Sequence>> {
     const PERIOD_NS: u64 = 50_000_000;
     let folder = data.join("stereo_seq/MicroEurocDataset/mav0");
     if !folder.is_dir() {
         return Ok(None);
     }
-    let sensors = ["cam0", "cam1"].map(|eye| folder.join(eye).join("sensor.yaml"));
+    let sensors = ["cam0", "cam1"].map(|camera| folder.join(camera).join("sensor.yaml"));
     let calibration = calibration::load_calibration(&[&sensors[0], &sensors[1]])?;
-    let names = numbered(&folder.join("cam0/data"))?;
+    let names = list_files(&folder.join("cam0/data"))?;
     let first = names.first().ok_or_else(|| format!("{}: no pictures", folder.display()))?;
-    let rectifier = Rectifier::new(&calibration, read(&folder.join("cam0/data").join(first))?.size())?;
+    let rectifier = Rectifier::new(&calibration, read_color(&folder.join("cam0/data").join(first))?.size())?;
     let frames = names.iter().enumerate().map(|(index, name)| {
-        let [left, right] = [0, 1].map(|eye: usize| {
+        let [left, right] = [0, 1].map(|camera: usize| {
             let mut rectified = ColorImage::default();
-            let taken = read(&folder.join(["cam0/data", "cam1/data"][eye]).join(name))?;
-            rectifier.maps()[eye].remap_color(&taken, &mut rectified);
+            let taken = read_color(&folder.join(["cam0/data", "cam1/data"][camera]).join(name))?;
+            rectifier.maps()[camera].remap_color(&taken, &mut rectified);
             Outcome::Ok(rectified)
         });
         Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: left?, right: right?, truth: None })
@@ -132,7 +137,7 @@ pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
 ///
 /// # Errors
 /// Fails if the file is missing or not a little-endian PFM of one channel.
-pub fn pfm(path: &Path) -> Outcome<DisparityMap> {
+pub fn read_pfm(path: &Path) -> Outcome<DisparityMap> {
     let wrong = || format!("{}: not a little-endian PFM of one channel", path.display());
     let bytes = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let header: Vec<_> = bytes.splitn(4, |&byte| byte == b'\n').collect();
@@ -150,19 +155,19 @@ pub fn pfm(path: &Path) -> Outcome<DisparityMap> {
     Ok(DisparityMap { width, height, px })
 }
 
-fn read(path: &Path) -> Outcome<ColorImage> {
-    sheet::read(path).ok_or_else(|| format!("{}: no picture that can be read", path.display()).into())
+fn read_color(path: &Path) -> Outcome<ColorImage> {
+    sheet::read_png(path).ok_or_else(|| format!("{}: no picture that can be read", path.display()).into())
 }
 
 /// Reads a disparity map of 16-bit grey, pixels times 256.
-fn disparity_file(path: &Path) -> Outcome<Plane<f32>> {
+fn read_disparity(path: &Path) -> Outcome<Plane<f32>> {
     let map = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?.into_luma16();
     let (width, height) = (map.width() as usize, map.height() as usize);
     Ok(Plane { width, height, data: map.iter().map(|&units| f32::from(units) / 256.0).collect() })
 }
 
 /// Returns the names of the files in a folder, sorted.
-fn numbered(folder: &Path) -> Outcome<Vec<String>> {
+fn list_files(folder: &Path) -> Outcome<Vec<String>> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut names = entries
         .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))

@@ -11,11 +11,11 @@ use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::{self, resize};
 
-use super::flicker::metres;
-use super::options::{Options, name};
-use super::picture::shot;
+use super::flicker::disparity_to_depth;
+use super::options::{Options, effort_name};
+use super::picture::create_shot;
 use super::quality::methods::{Blurrer, Method};
-use super::sequence::bundled;
+use super::sequence::load_bundled;
 use super::{Outcome, matcher};
 
 /// The frame that is shown, late enough for the memory to have content.
@@ -28,40 +28,48 @@ const WIDTH: u32 = 288;
 /// # Errors
 /// Fails if the recording is unreadable, the matcher or the blur fails, or the folder cannot be written.
 pub fn run(out: &Path, options: &Options) -> Outcome {
-    let sequence = bundled()?;
+    let sequence = load_bundled()?;
     let frame = &sequence.frames[FRAME];
     let (width, height) = frame.left.size();
     fs::create_dir_all(out)?;
-    keep(out, "left", &frame.left)?;
-    keep(out, "right", &frame.right)?;
+    write_thumbnail(out, "left", &frame.left)?;
+    write_thumbnail(out, "right", &frame.right)?;
     let max_px = sequence.disparities as f32;
     if let Some(truth) = &frame.truth {
-        keep(out, "true", &painted(&truth.data, (width, height), max_px))?;
+        write_thumbnail(out, "true", &colorize_disparity(&truth.data, (width, height), max_px))?;
     }
     for effort in [Effort::Fast, Effort::Full] {
-        let mut matcher = matcher::create(options, effort, sequence.disparities, (width, height), None)?;
+        let mut matcher = matcher::create_matcher(options, effort, sequence.disparities, (width, height), None)?;
         let (mut refiner, mut map) = (Refiner::new(), DisparityMap::default());
         for (index, frame) in sequence.frames.iter().enumerate().take(FRAME + 1) {
-            let [left, right] = frame.gray();
+            let [left, right] = frame.to_gray();
             matcher.compute_disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
-            let mut depth = metres(&map, &sequence.rig);
+            let mut depth = disparity_to_depth(&map, &sequence.rig);
             refiner.refine(&mut depth, &frame.left, frame.time_ns);
             if index < FRAME {
                 continue;
             }
             let refined: Vec<f32> = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();
-            keep(out, &format!("matched-{}", name(effort)), &painted(&map.px, (width, height), max_px))?;
+            write_thumbnail(
+                out,
+                &format!("matched-{}", effort_name(effort)),
+                &colorize_disparity(&map.px, (width, height), max_px),
+            )?;
             if effort == Effort::Full {
-                keep(out, "refined", &painted(&refined, (width, height), max_px))?;
-                let shot = shot(&frame.left, &depth);
-                keep(out, "blurred", &Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur(&shot)?)?;
+                write_thumbnail(out, "refined", &colorize_disparity(&refined, (width, height), max_px))?;
+                let shot = create_shot(&frame.left, &depth);
+                write_thumbnail(
+                    out,
+                    "blurred",
+                    &Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur(&shot)?,
+                )?;
             }
         }
     }
     Ok(())
 }
 
-fn keep(out: &Path, name: &str, image: &ColorImage) -> Outcome {
+fn write_thumbnail(out: &Path, name: &str, image: &ColorImage) -> Outcome {
     let whole = RgbImage::from_raw(image.width, image.height, image.rgb.clone()).unwrap_or_default();
     let small = resize(&whole, WIDTH, WIDTH * image.height / image.width, imageops::FilterType::Triangle);
     let path = out.join(format!("{name}.png"));
@@ -73,7 +81,7 @@ fn keep(out: &Path, name: &str, image: &ColorImage) -> Outcome {
 
 /// Colours disparities: from blue (far) over green to red (near); black is unknown. Uses the square root, as most of a
 /// room is far away.
-fn painted(px: &[f32], (width, height): (u32, u32), max_px: f32) -> ColorImage {
+fn colorize_disparity(px: &[f32], (width, height): (u32, u32), max_px: f32) -> ColorImage {
     let color = |&px: &f32| {
         if !(px > 0.0 && px.is_finite()) {
             return [0; 3];

@@ -9,9 +9,9 @@ use image::imageops::{FilterType, resize};
 use image::{DynamicImage, RgbImage};
 use serde::Serialize;
 
-use super::options::{Options, Times, name};
-use super::sequence::bundled;
-use super::{Outcome, matcher, print};
+use super::options::{Options, Times, effort_name};
+use super::sequence::load_bundled;
+use super::{Outcome, matcher, print_record};
 
 /// The times of a matcher on a pair.
 #[derive(Serialize)]
@@ -35,9 +35,9 @@ pub fn run(times: &Times, options: &Options) -> Outcome {
     if !options.json {
         println!("size       disparities effort threads  median ms    best ms  matcher");
     }
-    for pair in pairs(times)? {
+    for pair in load_pairs(times)? {
         for &disparities in &times.disparities {
-            for record in measure(&pair, disparities, times, options)? {
+            for record in measure_matchers(&pair, disparities, times, options)? {
                 let line = format!(
                     "{:10} {:11} {:6} {:7} {:10.2} {:10.2}  {}",
                     format!("{}x{}", record.size.0, record.size.1),
@@ -48,7 +48,7 @@ pub fn run(times: &Times, options: &Options) -> Outcome {
                     record.best_ms,
                     record.matcher
                 );
-                print(options, &line, &record)?;
+                print_record(options, &line, &record)?;
             }
         }
     }
@@ -56,24 +56,24 @@ pub fn run(times: &Times, options: &Options) -> Outcome {
 }
 
 /// Measures all efforts and thread counts in turn.
-fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Options) -> Outcome<Vec<Record>> {
+fn measure_matchers(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Options) -> Outcome<Vec<Record>> {
     let size = pair[0].size();
     let mut cases: Vec<(Box<dyn Matcher>, Record)> = Vec::new();
     for &effort in &options.efforts {
         for &threads in &times.threads {
-            let matcher = matcher::create(options, effort, disparities, size, Some(threads))?;
+            let matcher = matcher::create_matcher(options, effort, disparities, size, Some(threads))?;
             cases.push((matcher, Record::new(size, disparities, effort, threads)));
         }
     }
     let mut map = DisparityMap::default();
-    let mut turn = |matcher: &mut dyn Matcher| -> Outcome<f64> {
+    let mut time_matching = |matcher: &mut dyn Matcher| -> Outcome<f64> {
         let began = Instant::now();
         matcher.compute_disparity(Pair { left: &pair[0], color: None, right: &pair[1] }, &mut map)?;
         Ok(1e3 * began.elapsed().as_secs_f64())
     };
     for round in 0..=times.rounds {
         for (matcher, record) in &mut cases {
-            let time_ms = turn(matcher.as_mut())?;
+            let time_ms = time_matching(matcher.as_mut())?;
             // The first round allocates, and is not counted.
             if round > 0 {
                 record.times_ms.push(time_ms);
@@ -93,29 +93,29 @@ fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Opt
 
 impl Record {
     fn new(size: (u32, u32), disparities: u32, effort: Effort, threads: usize) -> Self {
-        let effort = name(effort);
+        let effort = effort_name(effort);
         let (matcher, times_ms) = (String::new(), Vec::new());
         Self { size, disparities, effort, threads, matcher, median_ms: 0.0, best_ms: 0.0, times_ms }
     }
 }
 
-fn pairs(times: &Times) -> Outcome<Vec<[GrayImage; 2]>> {
+fn load_pairs(times: &Times) -> Outcome<Vec<[GrayImage; 2]>> {
     if let [left, right] = &times.pair[..] {
         let read = |path: &Path| -> Outcome<GrayImage> {
             let image = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-            Ok(gray(&image))
+            Ok(to_gray(&image))
         };
         return Ok(vec![[read(left)?, read(right)?]]);
     }
-    let first = bundled()?.frames.swap_remove(0);
+    let first = load_bundled()?.frames.swap_remove(0);
     let scaled = |picture: &ColorImage, (width, height)| {
         let whole = RgbImage::from_raw(picture.width, picture.height, picture.rgb.clone()).unwrap_or_default();
-        gray(&DynamicImage::from(resize(&whole, width, height, FilterType::CatmullRom)))
+        to_gray(&DynamicImage::from(resize(&whole, width, height, FilterType::CatmullRom)))
     };
     Ok(times.size.iter().map(|&size| [scaled(&first.left, size), scaled(&first.right, size)]).collect())
 }
 
-fn gray(image: &DynamicImage) -> GrayImage {
+fn to_gray(image: &DynamicImage) -> GrayImage {
     let picture = image.to_rgb8();
     let mut gray = GrayImage::default();
     gray.set_luma_from(&ColorImage { width: picture.width(), height: picture.height(), rgb: picture.into_raw() });

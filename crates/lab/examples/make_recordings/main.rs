@@ -91,7 +91,7 @@ fn main() -> ExitCode {
 fn make_portrait(folder: &mut Folder) -> Outcome {
     let scene = Scene::portrait();
     let view = View::new(SIZE_PX.0, SIZE_PX.1);
-    folder.text("camera.txt", &camera_text(&scene, &view))?;
+    folder.write_or_check_text("camera.txt", &format_camera(&scene, &view))?;
     make_sequence(folder, &scene, &view)?;
     make_truth(folder, &scene, &view)
 }
@@ -102,22 +102,22 @@ fn make_stereo(folder: &mut Folder) -> Outcome {
     let scene = Scene::portrait();
     let left = View::new(SIZE_PX.0, SIZE_PX.1);
     let right = left.right_camera(BASELINE_M);
-    folder.text("calib.txt", &calibration_text(&left))?;
+    folder.write_or_check_text("calib.txt", &format_calibration(&left))?;
     let mut times = String::new();
     let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
     for frame in 0..STEREO_FRAMES {
         let mut render = |view: &View, picture: &mut ColorImage| {
-            scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, threads(), picture, &mut map);
+            scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, thread_count(), picture, &mut map);
         };
         render(&right, &mut picture);
-        folder.color(&format!("image_3/{frame:06}.png"), &picture)?;
+        folder.write_or_check_color(&format!("image_3/{frame:06}.png"), &picture)?;
         render(&left, &mut picture);
-        folder.color(&format!("image_2/{frame:06}.png"), &picture)?;
+        folder.write_or_check_color(&format!("image_2/{frame:06}.png"), &picture)?;
         let units_at_1_m = left.focal_px * BASELINE_M * DISPARITY_UNITS_PER_PX;
-        folder.gray16(&format!("disp/{frame:06}.png"), &map, |z_m| units_at_1_m / z_m)?;
+        folder.write_or_check_gray16(&format!("disp/{frame:06}.png"), &map, |z_m| units_at_1_m / z_m)?;
         writeln!(times, "{:.6}", time_s(frame))?;
     }
-    folder.text("times.txt", &times)
+    folder.write_or_check_text("times.txt", &times)
 }
 
 /// Renders the loop that is built into the program: a whole picture, then tiles as in [`demo::Layout`].
@@ -126,7 +126,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
     let render = |frame: u32| {
         let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
         let time_s = f64::from(frame) / f64::from(demo::FRAMES_PER_SECOND);
-        scene.render_pinhole(&view, time_s, SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
+        scene.render_pinhole(&view, time_s, SAMPLES_PER_PIXEL, thread_count(), &mut picture, &mut map);
         (picture, map)
     };
     if folder.check {
@@ -155,7 +155,7 @@ fn make_demo(folder: &mut Folder) -> Outcome {
     let layout = demo::Layout::new(tiles.iter().copied());
     let tiles: Vec<u8> = tiles.into_iter().map(|moves| if moves { 255 } else { 0 }).collect();
     let map_size = (demo::SIZE_PX.0 / demo::TILE_PX, demo::SIZE_PX.1 / demo::TILE_PX);
-    folder.encode("moving.png", &tiles, map_size, ExtendedColorType::L8)?;
+    folder.write_png("moving.png", &tiles, map_size, ExtendedColorType::L8)?;
     let (mut color, mut depth) = (Vec::new(), Vec::new());
     let mut add = |rgb: &[u8], levels: &[u8], (width, height): (u32, u32)| {
         let jpeg = JpegEncoder::new_with_quality(&mut color, JPEG_QUALITY);
@@ -193,12 +193,16 @@ fn check_demo(folder: &mut Folder, render: impl Fn(u32) -> (ColorImage, DepthMap
         let levels =
             |map: &DepthMap| map.metres.iter().map(|&z_m| i32::from(demo::quantize_depth(z_m))).collect::<Vec<_>>();
         let name = format!("frame {frame}, {psnr_db:.1} dB");
-        folder.compare(&name, psnr_db >= MIN_PSNR_DB, levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b));
+        folder.compare_values(
+            &name,
+            psnr_db >= MIN_PSNR_DB,
+            levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b),
+        );
     }
     Ok(())
 }
 
-fn frames(scene: &Scene) -> u32 {
+fn frame_count(scene: &Scene) -> u32 {
     (scene.period_s() * f64::from(FRAMES_PER_SECOND)).round() as u32
 }
 
@@ -206,7 +210,7 @@ fn time_s(frame: u32) -> f64 {
     f64::from(frame) / f64::from(FRAMES_PER_SECOND)
 }
 
-fn threads() -> usize {
+fn thread_count() -> usize {
     thread::available_parallelism().map_or(1, |n| n.get())
 }
 
@@ -219,17 +223,17 @@ fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     let mut pairs = String::new();
     let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
     for frame in 0..frames(scene) {
-        scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
-        folder.color(&format!("rgb/{frame:06}.png"), &picture)?;
-        folder.gray16(&format!("depth/{frame:06}.png"), &map, |z_m| z_m * DEPTH_UNITS_PER_METRE)?;
+        scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, thread_count(), &mut picture, &mut map);
+        folder.write_or_check_color(&format!("rgb/{frame:06}.png"), &picture)?;
+        folder.write_or_check_gray16(&format!("depth/{frame:06}.png"), &map, |z_m| z_m * DEPTH_UNITS_PER_METRE)?;
         let time = format!("{:.6}", time_s(frame));
         writeln!(rgb, "{time} rgb/{frame:06}.png")?;
         writeln!(depth, "{time} depth/{frame:06}.png")?;
         writeln!(pairs, "{time} rgb/{frame:06}.png {time} depth/{frame:06}.png")?;
     }
-    folder.text("rgb.txt", &rgb)?;
-    folder.text("depth.txt", &depth)?;
-    folder.text("associations.txt", &pairs)
+    folder.write_or_check_text("rgb.txt", &rgb)?;
+    folder.write_or_check_text("depth.txt", &depth)?;
+    folder.write_or_check_text("associations.txt", &pairs)
 }
 
 /// Renders frames through a true thin lens.
@@ -240,15 +244,15 @@ fn make_truth(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
         let aperture = lens_points(&Aperture { shape, intensity: 0.0 }, LENS_RAYS);
         let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: scene.focus_m(), aperture: &aperture };
         for &frame in frames {
-            let picture = scene.render_thin_lens(view, time_s(frame), &lens, threads());
-            folder.color(&format!("truth/{name}_clipped_{frame:06}.png"), &picture.clipped.to_srgb())?;
-            folder.color(&format!("truth/{name}_hdr_{frame:06}.png"), &picture.hdr.to_srgb())?;
+            let picture = scene.render_thin_lens(view, time_s(frame), &lens, thread_count());
+            folder.write_or_check_color(&format!("truth/{name}_clipped_{frame:06}.png"), &picture.clipped.to_srgb())?;
+            folder.write_or_check_color(&format!("truth/{name}_hdr_{frame:06}.png"), &picture.hdr.to_srgb())?;
         }
     }
     Ok(())
 }
 
-fn camera_text(scene: &Scene, view: &View) -> String {
+fn format_camera(scene: &Scene, view: &View) -> String {
     let centre = view.principal_point_px();
     format!(
         "# The camera of this recording; pixel centres are at whole numbers.\n\
@@ -267,11 +271,11 @@ fn camera_text(scene: &Scene, view: &View) -> String {
 }
 
 /// Returns the pair's geometry in KITTI's format: projections of the left and the right colour camera, row by row.
-fn calibration_text(view: &View) -> String {
+fn format_calibration(view: &View) -> String {
     let centre = view.principal_point_px();
-    let row = |eye_px: f32| {
+    let row = |offset_px: f32| {
         let focal_px = view.focal_px;
-        format!("{focal_px:.5} 0 {:.5} {eye_px:.5} 0 {focal_px:.5} {:.5} 0 0 0 1 0", centre.x, centre.y)
+        format!("{focal_px:.5} 0 {:.5} {offset_px:.5} 0 {focal_px:.5} {:.5} 0 0 0 1 0", centre.x, centre.y)
     };
     format!("P2: {}\nP3: {}\n", row(0.0), row(-view.focal_px * BASELINE_M))
 }

@@ -54,15 +54,15 @@ pub struct RankErrors {
 
 impl Analysis {
     /// Decomposes a mask and rebuilds it with each of `ranks`.
-    pub fn of(name: String, mask: &Mask, ranks: &[usize]) -> Self {
+    pub fn new(name: String, mask: &Mask, ranks: &[usize]) -> Self {
         let svd = Decomposition::new(mask);
-        let kernel = unit_sum(&mask.values);
+        let kernel = normalize_sum(&mask.values);
         let plateau = kernel.iter().copied().fold(0.0, f64::max);
         let approximations = ranks
             .iter()
             .map(|&rank| {
-                let taps = unit_sum(&svd.approximation(rank));
-                let errors = RankErrors::between(&kernel, &taps, plateau, rank, svd.relative_error(rank));
+                let taps = normalize_sum(&svd.approximation(rank));
+                let errors = RankErrors::measure(&kernel, &taps, plateau, rank, svd.relative_error(rank));
                 Approximation { rank, taps, errors }
             })
             .collect();
@@ -81,7 +81,7 @@ impl Analysis {
 
 impl RankErrors {
     /// Compares the approximation `taps` with `kernel`, both of unit sum; `plateau` is the largest tap of the kernel.
-    fn between(kernel: &[f64], taps: &[f64], plateau: f64, rank: usize, truncation_error: f64) -> Self {
+    fn measure(kernel: &[f64], taps: &[f64], plateau: f64, rank: usize, truncation_error: f64) -> Self {
         let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
         let difference = || kernel.iter().zip(taps).map(|(exact, tap)| tap - exact);
         Self {
@@ -94,7 +94,7 @@ impl RankErrors {
     }
 }
 
-fn unit_sum(taps: &[f64]) -> Vec<f64> {
+fn normalize_sum(taps: &[f64]) -> Vec<f64> {
     let sum: f64 = taps.iter().sum();
     taps.iter().map(|tap| tap / sum).collect()
 }
@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn a_disc_has_the_published_errors() {
         // Antialiased disc of 65 taps: 30.6, 20.3, 15.6 and 12.7 % at rank 1 to 4, lobes of -0.26 and -0.20.
-        let analysis = Analysis::of("disc".into(), &Aperture::default().to_mask(65, 0.0), &[1, 2, 3, 4]);
+        let analysis = Analysis::new("disc".into(), &Aperture::default().to_mask(65, 0.0), &[1, 2, 3, 4]);
         for (approximation, percent) in analysis.approximations.iter().zip([30.6, 20.3, 15.6, 12.7]) {
             let errors = approximation.errors;
             assert!((errors.truncation_error * 100.0 - percent).abs() < 0.3, "{errors:?}");

@@ -5,5 +5,5 @@ mod plot;
 mod sheet;
 
 pub use analysis::{Analysis, Approximation, RankErrors};
-pub use plot::error_by_rank;
-pub use sheet::draw;
+pub use plot::plot_error_by_rank;
+pub use sheet::draw_sheet;

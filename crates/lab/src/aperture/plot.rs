@@ -22,7 +22,7 @@ const COLORS: [RGBColor; 7] = [
 ///
 /// # Errors
 /// The drawing library fails.
-pub fn error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<String, String> {
+pub fn plot_error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<String, String> {
     let mut svg = String::new();
     let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
     draw(&area, analyses, size_px, rim).map_err(|error| error.to_string())?;

@@ -36,7 +36,7 @@ const DIGIT_CELL_PX: usize = 3;
 
 /// Draws the sheet: the kernel, then one column per rank under its number. Negative taps of an approximation are blue;
 /// a difference is red where the approximation is too large, and blue where it is too small.
-pub fn draw(analysis: &Analysis) -> ColorImage {
+pub fn draw_sheet(analysis: &Analysis) -> ColorImage {
     let zoom = (PANEL_PX / analysis.size).max(1);
     let panel = analysis.size * zoom;
     let columns = 1 + analysis.approximations.len();
@@ -48,12 +48,12 @@ pub fn draw(analysis: &Analysis) -> ColorImage {
     let left = |column: usize| MARGIN_PX + column * (panel + MARGIN_PX);
     let (upper, lower) = (LABEL_PX + MARGIN_PX / 2, LABEL_PX + MARGIN_PX / 2 + panel + MARGIN_PX);
     let tap_color = |tap: f64| tap_color(tap / analysis.plateau);
-    sheet.panel(left(0), upper, analysis.kernel.iter().map(|&tap| tap_color(tap)));
+    sheet.draw_panel(left(0), upper, analysis.kernel.iter().map(|&tap| tap_color(tap)));
     for (column, approximation) in (1..).zip(&analysis.approximations) {
-        sheet.number(left(column), panel, approximation.rank);
-        sheet.panel(left(column), upper, approximation.taps.iter().map(|&tap| tap_color(tap)));
+        sheet.draw_number(left(column), panel, approximation.rank);
+        sheet.draw_panel(left(column), upper, approximation.taps.iter().map(|&tap| tap_color(tap)));
         let differences = approximation.taps.iter().zip(&analysis.kernel).map(|(tap, exact)| tap - exact);
-        sheet.panel(left(column), lower, differences.map(|d| difference_color(d / analysis.plateau)));
+        sheet.draw_panel(left(column), lower, differences.map(|d| difference_color(d / analysis.plateau)));
     }
     sheet.image
 }
@@ -84,15 +84,15 @@ struct Sheet {
 
 impl Sheet {
     /// Draws `size * size` colours in row-major order as a panel with its corner at (`left`, `top`).
-    fn panel(&mut self, left: usize, top: usize, colors: impl Iterator<Item = [u8; 3]>) {
+    fn draw_panel(&mut self, left: usize, top: usize, colors: impl Iterator<Item = [u8; 3]>) {
         for (cell, color) in colors.enumerate() {
             let (column, row) = (cell % self.size, cell / self.size);
-            self.square(left + column * self.zoom, top + row * self.zoom, self.zoom, color);
+            self.fill_square(left + column * self.zoom, top + row * self.zoom, self.zoom, color);
         }
     }
 
     /// Draws a number in the label line, centred over the panel at `left` that is `panel` pixels wide.
-    fn number(&mut self, left: usize, panel: usize, number: usize) {
+    fn draw_number(&mut self, left: usize, panel: usize, number: usize) {
         let digits = number.to_string();
         // Three cells for a digit and one for space.
         let advance = 4 * DIGIT_CELL_PX;
@@ -100,13 +100,13 @@ impl Sheet {
         let top = LABEL_PX.saturating_sub(5 * DIGIT_CELL_PX);
         for digit in digits.bytes().map(|digit| usize::from(digit - b'0')) {
             for cell in (0..15).filter(|cell| DIGITS[digit] >> (14 - cell) & 1 == 1) {
-                self.square(x + cell % 3 * DIGIT_CELL_PX, top + cell / 3 * DIGIT_CELL_PX, DIGIT_CELL_PX, INK);
+                self.fill_square(x + cell % 3 * DIGIT_CELL_PX, top + cell / 3 * DIGIT_CELL_PX, DIGIT_CELL_PX, INK);
             }
             x += advance;
         }
     }
 
-    fn square(&mut self, left: usize, top: usize, side: usize, color: [u8; 3]) {
+    fn fill_square(&mut self, left: usize, top: usize, side: usize, color: [u8; 3]) {
         let stride = self.image.width as usize * 3;
         for y in top..top + side {
             let row = &mut self.image.rgb[y * stride + left * 3..][..side * 3];
@@ -122,8 +122,8 @@ mod tests {
 
     #[test]
     fn the_sheet_shows_the_kernel_white_and_equal_approximations_without_difference() {
-        let analysis = Analysis::of("disc".into(), &Aperture::default().to_mask(9, 0.0), &[1, 9]);
-        let sheet = draw(&analysis);
+        let analysis = Analysis::new("disc".into(), &Aperture::default().to_mask(9, 0.0), &[1, 9]);
+        let sheet = draw_sheet(&analysis);
         let panel = 9 * (PANEL_PX / 9);
         let at = |x: usize, y: usize| {
             let pixel = (y * sheet.width as usize + x) * 3;

@@ -1,6 +1,6 @@
 //! A bounding volume hierarchy, so that a ray tests only a few of thousands of shapes.
 
-use super::ray::{Bounds, Ray};
+use super::ray::{BoundingBox, Ray};
 use super::shape::Shape;
 
 /// A bounding volume hierarchy over the shapes of one part; its leaves are ranges of `order`.
@@ -13,7 +13,7 @@ pub struct Bvh {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    bounds: Bounds,
+    bounds: BoundingBox,
     /// For a leaf, its start in `order`. For an inner node, the index of its second child; the first one is the next
     /// node.
     first: u32,
@@ -31,7 +31,7 @@ const BUCKETS: usize = 12;
 impl Bvh {
     /// Builds the tree over `shapes`.
     pub fn new(shapes: &[Shape]) -> Self {
-        let boxes: Vec<Bounds> = shapes.iter().map(Shape::bounds).collect();
+        let boxes: Vec<BoundingBox> = shapes.iter().map(Shape::bounds).collect();
         let mut tree = Self { nodes: Vec::new(), order: (0..shapes.len() as u32).collect() };
         if !shapes.is_empty() {
             tree.split(&boxes, 0, shapes.len());
@@ -40,18 +40,18 @@ impl Bvh {
     }
 
     /// Returns the bounding box of all shapes.
-    pub fn bounds(&self) -> Bounds {
-        self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
+    pub fn bounds(&self) -> BoundingBox {
+        self.nodes.first().map_or(BoundingBox::EMPTY, |root| root.bounds)
     }
 
     /// Adds the nodes for `order[start..end]`, and sorts that range. Splits along the longest axis where the surface
     /// area heuristic (sum of area times number of shapes of both sides) is minimal; binned SAH, Wald 2007.
-    fn split(&mut self, boxes: &[Bounds], start: usize, end: usize) {
+    fn split(&mut self, boxes: &[BoundingBox], start: usize, end: usize) {
         let box_of = |shape: &u32| boxes[*shape as usize];
-        let bounds = self.order[start..end].iter().map(box_of).fold(Bounds::EMPTY, Bounds::join);
-        let centres = self.order[start..end].iter().map(box_of).fold(Bounds::EMPTY, |all, b| {
+        let bounds = self.order[start..end].iter().map(box_of).fold(BoundingBox::EMPTY, BoundingBox::union);
+        let centres = self.order[start..end].iter().map(box_of).fold(BoundingBox::EMPTY, |all, b| {
             let c = b.centre();
-            all.join(Bounds { low: c, high: c })
+            all.union(BoundingBox { low: c, high: c })
         });
         let extent = centres.high - centres.low;
         let axis = if extent.x >= extent.y && extent.x >= extent.z {
@@ -66,17 +66,17 @@ impl Bvh {
         if end - start <= LEAF_SHAPES || extent[axis] <= 0.0 {
             return;
         }
-        let bucket = |b: &Bounds| {
+        let bucket = |b: &BoundingBox| {
             (((b.centre()[axis] - centres.low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1)
         };
-        let mut filled = [(Bounds::EMPTY, 0usize); BUCKETS];
+        let mut filled = [(BoundingBox::EMPTY, 0usize); BUCKETS];
         for shape in &self.order[start..end] {
             let b = box_of(shape);
             let slot = &mut filled[bucket(&b)];
-            *slot = (slot.0.join(b), slot.1 + 1);
+            *slot = (slot.0.union(b), slot.1 + 1);
         }
-        let cost = |part: &[(Bounds, usize)]| {
-            let (b, n) = part.iter().fold((Bounds::EMPTY, 0), |(b, n), s| (b.join(s.0), n + s.1));
+        let cost = |part: &[(BoundingBox, usize)]| {
+            let (b, n) = part.iter().fold((BoundingBox::EMPTY, 0), |(b, n), s| (b.union(s.0), n + s.1));
             if n == 0 { f32::INFINITY } else { b.half_area() * n as f32 }
         };
         let cost_at = |at: usize| cost(&filled[..at]) + cost(&filled[at..]);
@@ -100,7 +100,7 @@ impl Bvh {
             stacked -= 1;
             let index = stack[stacked];
             let node = &self.nodes[index as usize];
-            if node.bounds.span(ray, t_max).is_none() {
+            if node.bounds.intersect_ray(ray, t_max).is_none() {
                 continue;
             }
             if node.count > 0 {
@@ -125,13 +125,13 @@ impl Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::noise::Dice;
+    use crate::scene::noise::Rng;
     use glam::Vec3;
 
     #[test]
     fn the_tree_finds_what_testing_every_shape_finds() {
-        let mut dice = Dice::new(1);
-        let mut point = |scale: f32| scale * Vec3::new(dice.next() - 0.5, dice.next() - 0.5, dice.next() - 0.5);
+        let mut rng = Rng::new(1);
+        let mut point = |scale: f32| scale * Vec3::new(rng.next() - 0.5, rng.next() - 0.5, rng.next() - 0.5);
         let shapes: Vec<Shape> = (0..500)
             .map(|_| {
                 let a = point(4.0) + 5.0 * Vec3::Z;

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use super::grid::Grid;
+use super::grid::DistanceGrid;
 use super::part::Surface;
 
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub struct Light {
     /// Radius of the lamp over its distance: the softness of its shadows.
     pub softness: f32,
     /// Parts cast shadows on themselves only if the light is nearer than this, in metres.
-    pub casts_within_m: f32,
+    pub self_shadow_range_m: f32,
 }
 
 /// Ambient light, by the direction that a surface faces.
@@ -29,16 +29,16 @@ pub struct Ambient {
 
 /// A ball that occludes light, in world coordinates.
 #[derive(Clone, Copy, Debug)]
-pub struct Shade {
+pub struct Occluder {
     pub centre: Vec3,
     pub radius: f32,
-    /// The part that it represents, which it does not shade.
+    /// The part that it represents, which it does not occluder.
     pub part: usize,
 }
 
 /// A point to be lit.
 #[derive(Clone, Copy, Debug)]
-pub struct Lit<'a> {
+pub struct LitPoint<'a> {
     /// The point in the world, in metres.
     pub p: Vec3,
     /// Unit vector to the camera.
@@ -47,14 +47,14 @@ pub struct Lit<'a> {
     pub surface: Surface,
     /// The part that it belongs to.
     pub part: usize,
-    pub shades: &'a [Shade],
+    pub occluders: &'a [Occluder],
 }
 
 /// A part's form and a point in its frame, for self-occlusion.
 #[derive(Clone, Copy)]
-pub struct Form<'a> {
+pub struct SelfOccluder<'a> {
     /// Distances to the form.
-    pub grid: &'a Grid,
+    pub grid: &'a DistanceGrid,
     /// Rotates a world direction into the part's frame.
     pub to_local: &'a dyn Fn(Vec3) -> Vec3,
     /// The point in the part's frame.
@@ -64,22 +64,24 @@ pub struct Form<'a> {
 }
 
 /// Light that contributes less than this (1 = white) gets no shadow, as it would be invisible.
-const FAINT: f32 = 0.03;
+const MIN_SHADOWED_RADIANCE: f32 = 0.03;
 /// Balls farther away than this do not occlude, in metres.
-const SHADE_RADIUS_M: f32 = 0.7;
+const MAX_OCCLUDER_DISTANCE_M: f32 = 0.7;
 
-/// Returns the radiance from the point to the camera: reflected lamps and ambient light, plus emission. `form` is that
+/// Returns the radiance from the point to the camera: reflected lamps and ambient light, plus emission. `self_occluder` is the form
 /// of its part, for self-occlusion.
-pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>) -> Vec3 {
+pub fn shade_point(lit: &LitPoint, lights: &[Light], ambient: &Ambient, self_occluder: Option<SelfOccluder>) -> Vec3 {
     let surface = &lit.surface;
-    let near = |s: &Shade| s.part != lit.part && s.centre.distance_squared(lit.p) < SHADE_RADIUS_M * SHADE_RADIUS_M;
-    let shaded = lit.shades.iter().any(near);
-    let mut open = surface.open * form.map_or(1.0, |f| openness(&f));
+    let near = |s: &Occluder| {
+        s.part != lit.part && s.centre.distance_squared(lit.p) < MAX_OCCLUDER_DISTANCE_M * MAX_OCCLUDER_DISTANCE_M
+    };
+    let shaded = lit.occluders.iter().any(near);
+    let mut visibility = surface.ambient_visibility * self_occluder.map_or(1.0, |f| self_ambient_visibility(&f));
     if shaded {
-        open *= shades_openness(lit);
+        visibility *= occluders_ambient_visibility(lit);
     }
     let up = 0.5 + 0.5 * surface.normal.y;
-    let mut diffuse = (ambient.below + (ambient.above - ambient.below) * up) * open;
+    let mut diffuse = (ambient.below + (ambient.above - ambient.below) * up) * visibility;
     let mut highlight = Vec3::ZERO;
     for light in lights {
         let to_light = light.position - lit.p;
@@ -92,13 +94,13 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
             continue;
         }
         // Cavities of the paint, which the geometry lacks, also hide part of each lamp.
-        let mut seen = 0.4 + 0.6 * surface.open;
-        if lambert.max(lobe) * strength.max_element() > FAINT {
+        let mut seen = 0.4 + 0.6 * surface.ambient_visibility;
+        if lambert.max(lobe) * strength.max_element() > MIN_SHADOWED_RADIANCE {
             if shaded {
-                seen *= shades_visibility(lit, direction, distance_m, light.softness);
+                seen *= occluders_visibility(lit, direction, distance_m, light.softness);
             }
-            if let (true, Some(f)) = (distance_m < light.casts_within_m && seen > 0.01, form) {
-                seen *= form_visibility(&f, (f.to_local)(direction), distance_m, light.softness);
+            if let (true, Some(f)) = (distance_m < light.self_shadow_range_m && seen > 0.01, self_occluder) {
+                seen *= self_visibility(&f, (f.to_local)(direction), distance_m, light.softness);
             }
         }
         diffuse += strength * (lambert * seen);
@@ -115,26 +117,27 @@ fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
         // Hair after Kajiya and Kay 1989: bright across the fibre, dark along it.
         let across = |v: Vec3| (1.0 - surface.fibre.dot(v).powi(2)).max(0.0).sqrt();
         let around = ((facing + 0.6) / 1.6).clamp(0.0, 1.0);
-        return (across(to_light) * around, surface.gloss * across(half).powf(surface.shine) * around);
+        return (across(to_light) * around, surface.specular * across(half).powf(surface.shininess) * around);
     }
     let lambert = ((facing + surface.wrap) / (1.0 + surface.wrap)).max(0.0);
-    if surface.gloss <= 0.0 || facing <= 0.0 {
+    if surface.specular <= 0.0 || facing <= 0.0 {
         return (lambert, 0.0);
     }
-    let lobe = surface.normal.dot(half).max(0.0).powf(surface.shine);
+    let lobe = surface.normal.dot(half).max(0.0).powf(surface.shininess);
     // Stronger at grazing angles, like Fresnel reflection; fades in where the surface begins to face the lamp.
     let edge = 1.0 + 3.0 * (1.0 - half.dot(to_eye).max(0.0)).powi(5);
-    (lambert, surface.gloss * lobe * edge * facing.min(0.25) * 4.0)
+    (lambert, surface.specular * lobe * edge * facing.min(0.25) * 4.0)
 }
 
 /// Returns how open the part's own form leaves the surroundings, 0 to 1: ambient occlusion from how much smaller the
 /// distances along the normal are than the distances travelled.
-fn openness(form: &Form) -> f32 {
+fn self_ambient_visibility(self_occluder: &SelfOccluder) -> f32 {
     // Distances along the normal in cells, and weights. They start at 1.5, as the grid has no detail finer than a cell.
-    let taps = [(1.5, 1.0), (4.0, 0.7), (10.0, 0.45), (24.0, 0.28)].map(|(n, weight)| (n * form.grid.cell_m(), weight));
+    let taps = [(1.5, 1.0), (4.0, 0.7), (10.0, 0.45), (24.0, 0.28)]
+        .map(|(n, weight)| (n * self_occluder.grid.cell_m(), weight));
     let (mut hidden, mut total) = (0.0, 0.0);
     for (range_m, weight) in taps {
-        let gap_m = form.grid.gap_m(form.p + range_m * form.normal);
+        let gap_m = self_occluder.grid.distance_m(self_occluder.p + range_m * self_occluder.normal);
         hidden += weight * (1.0 - (gap_m / range_m).clamp(0.0, 1.0));
         total += weight;
     }
@@ -142,13 +145,13 @@ fn openness(form: &Form) -> f32 {
 }
 
 /// Returns the visible fraction of a lamp past the part's own form, 0 to 1 (soft shadows after I. Quilez).
-fn form_visibility(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
+fn self_visibility(self_occluder: &SelfOccluder, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let range_m = distance_m.min(1.2);
-    let cell_m = form.grid.cell_m();
-    let start = form.p + 0.7 * cell_m * form.normal;
+    let cell_m = self_occluder.grid.cell_m();
+    let start = self_occluder.p + 0.7 * cell_m * self_occluder.normal;
     let (mut seen, mut along_m) = (1.0f32, 1.2 * cell_m);
     for _ in 0..12 {
-        let gap_m = form.grid.gap_m(start + along_m * direction);
+        let gap_m = self_occluder.grid.distance_m(start + along_m * direction);
         seen = seen.min(0.5 + 0.5 * gap_m / (softness * along_m));
         if seen <= 0.0 {
             return 0.0;
@@ -158,37 +161,37 @@ fn form_visibility(form: &Form, direction: Vec3, distance_m: f32, softness: f32)
             break;
         }
     }
-    smooth(seen)
+    smoothstep(seen)
 }
 
-/// Returns the visible fraction of a lamp past the [`Shade`]s of other parts, 0 to 1.
-fn shades_visibility(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
+/// Returns the visible fraction of a lamp past the [`Occluder`]s of other parts, 0 to 1.
+fn occluders_visibility(lit: &LitPoint, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let mut seen = 1.0;
-    for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
-        let to_shade = shade.centre - lit.p;
-        let along_m = to_shade.dot(direction);
+    for occluder in lit.occluders.iter().filter(|s| s.part != lit.part) {
+        let to_occluder = occluder.centre - lit.p;
+        let along_m = to_occluder.dot(direction);
         if along_m <= 0.0 || along_m >= distance_m {
             continue;
         }
-        let gap_m = (to_shade.length_squared() - along_m * along_m).max(0.0).sqrt() - shade.radius;
-        seen *= smooth((0.5 + 0.5 * gap_m / (softness * along_m + 1e-3)).clamp(0.0, 1.0));
+        let gap_m = (to_occluder.length_squared() - along_m * along_m).max(0.0).sqrt() - occluder.radius;
+        seen *= smoothstep((0.5 + 0.5 * gap_m / (softness * along_m + 1e-3)).clamp(0.0, 1.0));
     }
     seen
 }
 
-/// Returns how open the [`Shade`]s of other parts leave the surroundings, 0 to 1.
-fn shades_openness(lit: &Lit) -> f32 {
-    let mut open = 1.0;
-    for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
-        let to_shade = shade.centre - lit.p;
-        let distance_m = to_shade.length().max(shade.radius);
-        let angle = shade.radius / distance_m;
-        open *= 1.0 - 0.8 * (lit.surface.normal.dot(to_shade) / distance_m).max(0.0) * angle * angle;
+/// Returns how open the [`Occluder`]s of other parts leave the surroundings, 0 to 1.
+fn occluders_ambient_visibility(lit: &LitPoint) -> f32 {
+    let mut visibility = 1.0;
+    for occluder in lit.occluders.iter().filter(|s| s.part != lit.part) {
+        let to_occluder = occluder.centre - lit.p;
+        let distance_m = to_occluder.length().max(occluder.radius);
+        let angle = occluder.radius / distance_m;
+        visibility *= 1.0 - 0.8 * (lit.surface.normal.dot(to_occluder) / distance_m).max(0.0) * angle * angle;
     }
-    open
+    visibility
 }
 
 /// Returns the smoothstep of `x` in 0..1.
-fn smooth(x: f32) -> f32 {
+fn smoothstep(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }

@@ -21,9 +21,9 @@ pub use render::{LensPicture, LinearImage, ThinLens, View};
 pub use targets::PointLight;
 
 use glam::Vec3;
-use light::{Ambient, Form, Light, Lit, Shade};
-use part::{Part, Spot};
-use ray::{Bounds, Pose, Ray};
+use light::{Ambient, Light, LitPoint, Occluder, SelfOccluder};
+use part::{Part, ShadingPoint};
+use ray::{BoundingBox, Pose, Ray};
 
 /// A lit scene whose motion repeats after [`Scene::period_s`].
 #[derive(Clone, Debug)]
@@ -41,22 +41,22 @@ impl Scene {
     /// Returns a person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a
     /// metre; behind, furniture, a shelf and a window to a lit street.
     pub fn portrait() -> Scene {
-        portrait::with_front()
+        portrait::create_portrait()
     }
 
     /// Returns the portrait without objects in front of the person, as a webcam sees most people.
-    pub fn sitter() -> Scene {
-        Self::of(Situation::Sits)
+    pub fn seated_person() -> Scene {
+        Self::in_situation(Situation::Sits)
     }
 
     /// Returns a person in a situation.
-    pub fn of(situation: Situation) -> Scene {
-        portrait::of(Some(situation), situation)
+    pub fn in_situation(situation: Situation) -> Scene {
+        portrait::create_scene(Some(situation), situation)
     }
 
     /// Returns the room of a situation without the person.
-    pub fn room_of(situation: Situation) -> Scene {
-        portrait::of(None, situation)
+    pub fn empty_room(situation: Situation) -> Scene {
+        portrait::create_scene(None, situation)
     }
 
     /// Returns the length of the seamless loop, in seconds.
@@ -70,34 +70,34 @@ impl Scene {
     }
 
     /// Returns the scene at `time_s`.
-    fn at(&self, time_s: f64) -> Moment<'_> {
+    fn pose_at(&self, time_s: f64) -> PosedScene<'_> {
         let phase = (time_s / self.period_s).rem_euclid(1.0) as f32;
         let poses: Vec<Pose> = self.parts.iter().map(|part| (part.motion)(phase)).collect();
-        let shades = self
+        let occluders = self
             .parts
             .iter()
             .zip(&poses)
             .enumerate()
             .flat_map(|(index, (part, pose))| {
-                part.shades.iter().map(move |(centre, radius)| Shade {
+                part.occluders.iter().map(move |(centre, radius)| Occluder {
                     centre: pose.to_world(*centre),
                     radius: *radius,
                     part: index,
                 })
             })
             .collect();
-        let boxes = self.parts.iter().zip(&poses).map(|(part, pose)| part.tree.bounds().posed(pose)).collect();
-        Moment { scene: self, poses, boxes, shades }
+        let boxes = self.parts.iter().zip(&poses).map(|(part, pose)| part.bvh.bounds().transformed(pose)).collect();
+        PosedScene { scene: self, poses, boxes, occluders }
     }
 }
 
 /// A scene at one point in time.
-struct Moment<'a> {
+struct PosedScene<'a> {
     scene: &'a Scene,
     poses: Vec<Pose>,
     /// Bounding box of each part, in world coordinates.
-    boxes: Vec<Bounds>,
-    shades: Vec<Shade>,
+    boxes: Vec<BoundingBox>,
+    occluders: Vec<Occluder>,
 }
 
 /// The first hit of a ray.
@@ -108,16 +108,16 @@ struct Hit {
     shape: usize,
 }
 
-impl Moment<'_> {
+impl PosedScene<'_> {
     /// Returns the nearest hit along the ray.
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut hit: Option<Hit> = None;
         for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
             let t_max = hit.map_or(f32::INFINITY, |h| h.t);
-            if self.boxes[part].span(ray, t_max).is_none() {
+            if self.boxes[part].intersect_ray(ray, t_max).is_none() {
                 continue;
             }
-            let found = group.tree.intersect(&group.shapes, &pose.ray_to_local(ray), t_max);
+            let found = group.bvh.intersect(&group.shapes, &pose.ray_to_local(ray), t_max);
             if let Some((t, shape)) = found {
                 hit = Some(Hit { t, part, shape: shape as usize });
             }
@@ -142,10 +142,10 @@ impl Moment<'_> {
         let local = pose.to_local(p);
         let mut point = shape.surface(local);
         // Open shapes are visible from both sides.
-        if (pose.turn * point.normal).dot(ray.unit) > 0.0 {
+        if (pose.rotation * point.normal).dot(ray.unit) > 0.0 {
             point.normal = -point.normal;
         }
-        let spot = Spot {
+        let shading_point = ShadingPoint {
             p: local,
             normal: point.normal,
             uv: point.uv,
@@ -153,16 +153,21 @@ impl Moment<'_> {
             tint: material.tint,
             seed: material.seed,
         };
-        let mut surface = (material.paint)(&spot);
+        let mut surface = (material.shader)(&shading_point);
         // A surface without reflection needs no shadows.
-        if surface.albedo == Vec3::ZERO && surface.gloss <= 0.0 {
+        if surface.albedo == Vec3::ZERO && surface.specular <= 0.0 {
             return surface.emission;
         }
-        surface.normal = pose.turn * surface.normal;
-        surface.fibre = pose.turn * surface.fibre;
-        let lit = Lit { p, to_eye: -ray.unit, surface, part: hit.part, shades: &self.shades };
-        let to_local = |direction: Vec3| pose.turn.transpose() * direction;
-        let form = part.form.as_deref().map(|grid| Form { grid, to_local: &to_local, p: local, normal: point.normal });
-        light::shine(&lit, &self.scene.lights, &self.scene.ambient, form)
+        surface.normal = pose.rotation * surface.normal;
+        surface.fibre = pose.rotation * surface.fibre;
+        let lit = LitPoint { p, to_eye: -ray.unit, surface, part: hit.part, occluders: &self.occluders };
+        let to_local = |direction: Vec3| pose.rotation.transpose() * direction;
+        let self_occluder = part.distance_grid.as_deref().map(|grid| SelfOccluder {
+            grid,
+            to_local: &to_local,
+            p: local,
+            normal: point.normal,
+        });
+        light::shade_point(&lit, &self.scene.lights, &self.scene.ambient, self_occluder)
     }
 }

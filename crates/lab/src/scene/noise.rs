@@ -10,19 +10,19 @@ pub fn hash(x: u32) -> u32 {
 }
 
 /// Returns the hash of `x` as a number in 0..1.
-pub fn unit(x: u32) -> f32 {
+pub fn hash_to_unit(x: u32) -> f32 {
     (hash(x) >> 8) as f32 / (1 << 24) as f32
 }
 
 /// Returns the hash of a cell of the plane as a number in 0..1.
-pub fn cell(x: i32, y: i32) -> f32 {
-    unit((x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77))
+pub fn hash_cell(x: i32, y: i32) -> f32 {
+    hash_to_unit((x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77))
 }
 
 /// A pseudo-random number generator with a seed.
-pub struct Dice(u32);
+pub struct Rng(u32);
 
-impl Dice {
+impl Rng {
     /// Creates the generator of `seed`.
     pub fn new(seed: u32) -> Self {
         Self(hash(seed ^ 0x51ab_7e11))
@@ -31,7 +31,7 @@ impl Dice {
     /// Returns the next number in 0..1.
     pub fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9);
-        unit(self.0)
+        hash_to_unit(self.0)
     }
 
     /// Returns the next number in `low..high`.
@@ -49,13 +49,13 @@ impl Dice {
 }
 
 /// Returns smooth value noise in 0..1 with cells of size 1.
-pub fn value(p: Vec3) -> f32 {
+pub fn value_noise(p: Vec3) -> f32 {
     let floor = p.floor();
     let f = p - floor;
     let w = f * f * (3.0 - 2.0 * f);
     let (x, y, z) = (floor.x as i32 as u32, floor.y as i32 as u32, floor.z as i32 as u32);
     let corner = |dx: u32, dy: u32, dz: u32| {
-        unit(
+        hash_to_unit(
             x.wrapping_add(dx).wrapping_mul(0x9e37_79b1)
                 ^ y.wrapping_add(dy).wrapping_mul(0x85eb_ca77)
                 ^ z.wrapping_add(dz).wrapping_mul(0xc2b2_ae3d),
@@ -67,10 +67,10 @@ pub fn value(p: Vec3) -> f32 {
 }
 
 /// Returns `octaves` of value noise, each twice as fine and half as strong, in 0..1.
-pub fn fractal(mut p: Vec3, octaves: u32) -> f32 {
+pub fn fractal_noise(mut p: Vec3, octaves: u32) -> f32 {
     let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
     for _ in 0..octaves {
-        sum += weight * value(p);
+        sum += weight * value_noise(p);
         total += weight;
         weight *= 0.5;
         // Not exactly doubled, and shifted, so that the cells of the octaves do not coincide.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::bvh::Bvh;
-use super::grid::Grid;
+use super::grid::DistanceGrid;
 use super::ray::Pose;
 use super::shape::Shape;
 
-/// A surface point to be painted, in the frame of its part.
+/// A surface point to be shaded, in the frame of its part.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
+pub struct ShadingPoint {
     /// Position in metres.
     pub p: Vec3,
     pub normal: Vec3,
@@ -34,57 +34,57 @@ pub struct Surface {
     /// Unit normal, possibly bump-mapped.
     pub normal: Vec3,
     /// Strength of the highlight.
-    pub gloss: f32,
+    pub specular: f32,
     /// Exponent of the highlight's lobe.
-    pub shine: f32,
+    pub shininess: f32,
     /// How far light wraps around the edge of shadow, 0 (hard) to 1 (skin, leaves, cloth).
     pub wrap: f32,
     /// Ambient light that reaches the point, 0 to 1, in addition to the occlusion by the part's own form.
-    pub open: f32,
+    pub ambient_visibility: f32,
     /// Direction of a fibre, which is shaded as a thread; zero for surfaces.
     pub fibre: Vec3,
 }
 
 impl Surface {
-    /// Creates a matt surface of the given reflectance.
-    pub fn matt(spot: &Spot, albedo: Vec3) -> Self {
+    /// Creates a diffuse (matt) surface of the given reflectance.
+    pub fn diffuse(point: &ShadingPoint, albedo: Vec3) -> Self {
         Self {
             albedo,
             emission: Vec3::ZERO,
-            normal: spot.normal,
-            gloss: 0.0,
-            shine: 1.0,
+            normal: point.normal,
+            specular: 0.0,
+            shininess: 1.0,
             wrap: 0.0,
-            open: 1.0,
+            ambient_visibility: 1.0,
             fibre: Vec3::ZERO,
         }
     }
 
-    pub fn glossy(self, gloss: f32, shine: f32) -> Self {
-        Self { gloss, shine, ..self }
+    pub fn with_highlight(self, specular: f32, shininess: f32) -> Self {
+        Self { specular, shininess, ..self }
     }
 }
 
-/// Computes the surface of a spot.
-pub type Paint = fn(&Spot) -> Surface;
+/// Computes the surface at a point.
+pub type SurfaceShader = fn(&ShadingPoint) -> Surface;
 
-/// A paint with colour and seed.
+/// A surface shader with colour and seed.
 #[derive(Clone, Copy, Debug)]
 pub struct Material {
-    pub paint: Paint,
+    pub shader: SurfaceShader,
     pub tint: Vec3,
-    /// Distinguishes objects with the same paint.
+    /// Distinguishes objects with the same shader.
     pub seed: u32,
 }
 
 impl Material {
     /// Creates a material of one colour.
-    pub fn new(paint: Paint, tint: Vec3) -> Self {
-        Self { paint, tint, seed: 0 }
+    pub fn new(shader: SurfaceShader, tint: Vec3) -> Self {
+        Self { shader, tint, seed: 0 }
     }
 
     /// Returns the material with another seed.
-    pub fn seeded(self, seed: u32) -> Self {
+    pub fn with_seed(self, seed: u32) -> Self {
         Self { seed, ..self }
     }
 }
@@ -95,34 +95,34 @@ pub struct Part {
     pub shapes: Vec<Shape>,
     /// The material of each shape.
     pub materials: Vec<Material>,
-    /// The tree over the shapes, built by [`Part::built`].
-    pub tree: Bvh,
+    /// The tree over the shapes, built by [`Part::with_bvh`].
+    pub bvh: Bvh,
     /// The pose at a phase (0..1) of the loop.
     pub motion: fn(f32) -> Pose,
-    /// The approximate form, for self-occlusion.
-    pub form: Option<Arc<Grid>>,
+    /// Distances to the approximate form, for self-occlusion.
+    pub distance_grid: Option<Arc<DistanceGrid>>,
     /// Whether it belongs to the person.
     pub is_subject: bool,
     /// Balls (centre, radius in metres) that shade other parts.
-    pub shades: Vec<(Vec3, f32)>,
+    pub occluders: Vec<(Vec3, f32)>,
 }
 
 impl Part {
     /// Creates a static part without shapes.
-    pub fn still() -> Self {
-        Self::moving(|_| Pose::REST)
+    pub fn new_static() -> Self {
+        Self::new_moving(|_| Pose::IDENTITY)
     }
 
     /// Creates a moving part without shapes.
-    pub fn moving(motion: fn(f32) -> Pose) -> Self {
+    pub fn new_moving(motion: fn(f32) -> Pose) -> Self {
         Self {
             shapes: Vec::new(),
             materials: Vec::new(),
-            tree: Bvh::default(),
+            bvh: Bvh::default(),
             motion,
-            form: None,
+            distance_grid: None,
             is_subject: false,
-            shades: Vec::new(),
+            occluders: Vec::new(),
         }
     }
 
@@ -140,8 +140,8 @@ impl Part {
     }
 
     /// Returns the part with its tree.
-    pub fn built(mut self) -> Self {
-        self.tree = Bvh::new(&self.shapes);
+    pub fn with_bvh(mut self) -> Self {
+        self.bvh = Bvh::new(&self.shapes);
         self
     }
 }

@@ -31,31 +31,31 @@ impl Ray {
     /// Returns the point of the ray nearest to `p`, and its distance along the ray in metres. Intersections are
     /// computed from there, because the square of a hair's radius would be lost in the rounding of a squared camera
     /// distance.
-    pub fn near(&self, p: Vec3) -> (Vec3, f32) {
+    pub fn closest_point(&self, p: Vec3) -> (Vec3, f32) {
         let along_m = (p - self.origin).dot(self.unit);
         (self.origin + along_m * self.unit, along_m)
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub struct BoundingBox {
     /// The corner with the lowest coordinates.
     pub low: Vec3,
     /// The corner with the highest coordinates.
     pub high: Vec3,
 }
 
-impl Bounds {
+impl BoundingBox {
     /// The empty box.
-    pub const EMPTY: Bounds = Bounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+    pub const EMPTY: BoundingBox = BoundingBox { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
     /// Creates the box around `centre` with half its size.
-    pub fn around(centre: Vec3, half: Vec3) -> Self {
+    pub fn from_center(centre: Vec3, half: Vec3) -> Self {
         Self { low: centre - half, high: centre + half }
     }
 
     /// Returns the smallest box that contains both.
-    pub fn join(self, other: Bounds) -> Self {
+    pub fn union(self, other: BoundingBox) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
@@ -64,10 +64,11 @@ impl Bounds {
     }
 
     /// Returns a bounding box of the box in `pose`.
-    pub fn posed(&self, pose: &Pose) -> Self {
-        let (half, turn) = (0.5 * (self.high - self.low), pose.turn);
-        let half_extent = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
-        Self::around(pose.to_world(self.centre()), half_extent)
+    pub fn transformed(&self, pose: &Pose) -> Self {
+        let (half, rotation) = (0.5 * (self.high - self.low), pose.rotation);
+        let half_extent =
+            rotation.x_axis.abs() * half.x + rotation.y_axis.abs() * half.y + rotation.z_axis.abs() * half.z;
+        Self::from_center(pose.to_world(self.centre()), half_extent)
     }
 
     /// Returns half the surface area, to which the probability of a hit is proportional.
@@ -77,7 +78,7 @@ impl Bounds {
     }
 
     /// Returns the interval of the ray inside the box, clipped to `0..t_max`; `None` if it is empty.
-    pub fn span(&self, ray: &Ray, t_max: f32) -> Option<(f32, f32)> {
+    pub fn intersect_ray(&self, ray: &Ray, t_max: f32) -> Option<(f32, f32)> {
         let a = (self.low - ray.origin) * ray.inverse;
         let b = (self.high - ray.origin) * ray.inverse;
         let enter = a.min(b).max_element().max(0.0);
@@ -86,40 +87,43 @@ impl Bounds {
     }
 }
 
-/// The pose of a part: `world = turn * local + place`.
+/// The pose of a part: `world = rotation * local + translation`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
-    pub turn: Mat3,
+    pub rotation: Mat3,
     /// Position of the part's origin, in metres.
-    pub place: Vec3,
+    pub translation: Vec3,
 }
 
 impl Pose {
     /// The identity.
-    pub const REST: Pose = Pose { turn: Mat3::IDENTITY, place: Vec3::ZERO };
+    pub const IDENTITY: Pose = Pose { rotation: Mat3::IDENTITY, translation: Vec3::ZERO };
 
     /// Returns the composition: `inner` first, then `self`.
-    pub fn over(self, inner: Pose) -> Pose {
-        Pose { turn: self.turn * inner.turn, place: self.turn * inner.place + self.place }
+    pub fn compose(self, inner: Pose) -> Pose {
+        Pose {
+            rotation: self.rotation * inner.rotation,
+            translation: self.rotation * inner.translation + self.translation,
+        }
     }
 
     /// Creates a rotation around the point `pivot`.
-    pub fn about(pivot: Vec3, turn: Mat3) -> Pose {
-        Pose { turn, place: pivot - turn * pivot }
+    pub fn rotation_about(pivot: Vec3, rotation: Mat3) -> Pose {
+        Pose { rotation, translation: pivot - rotation * pivot }
     }
 
     /// Converts a world point to the part's frame.
     pub fn to_local(self, p: Vec3) -> Vec3 {
-        self.turn.transpose() * (p - self.place)
+        self.rotation.transpose() * (p - self.translation)
     }
 
     /// Converts a point of the part's frame to world coordinates.
     pub fn to_world(self, p: Vec3) -> Vec3 {
-        self.turn * p + self.place
+        self.rotation * p + self.translation
     }
 
     /// Converts the ray to the part's frame; `t` keeps its meaning.
     pub fn ray_to_local(&self, ray: &Ray) -> Ray {
-        Ray::new(self.to_local(ray.origin), self.turn.transpose() * ray.direction)
+        Ray::new(self.to_local(ray.origin), self.rotation.transpose() * ray.direction)
     }
 }

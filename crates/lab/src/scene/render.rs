@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use glam::{DVec2, Vec2, Vec3};
 
 use super::ray::Ray;
-use super::{Moment, Scene};
+use super::{PosedScene, Scene};
 use bokehcam::color::encode_srgb;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 
@@ -39,24 +39,24 @@ impl View {
     }
 
     /// Returns where the ray of the picture position `p_px` meets the plane at unit depth, relative to the camera.
-    fn slope(&self, p_px: Vec2) -> Vec2 {
+    fn ray_slope(&self, p_px: Vec2) -> Vec2 {
         let q = (p_px - self.principal_point_px()) / self.focal_px;
         Vec2::new(q.x, -q.y)
     }
 
-    fn eye(&self) -> Vec3 {
+    fn camera_position(&self) -> Vec3 {
         self.camera_offset_m * Vec3::X
     }
 
     fn pinhole_ray(&self, p_px: Vec2) -> Ray {
-        Ray::new(self.eye(), self.slope(p_px).extend(1.0))
+        Ray::new(self.camera_position(), self.ray_slope(p_px).extend(1.0))
     }
 
     /// Returns the ray that leaves the lens at `lens_m` (right and up of its centre) and meets the pinhole ray at the
     /// focal plane.
     fn lens_ray(&self, p_px: Vec2, lens_m: Vec2, focus_m: f32) -> Ray {
-        let direction = self.slope(p_px) - lens_m / focus_m;
-        Ray::new(self.eye() + lens_m.extend(0.0), direction.extend(1.0))
+        let direction = self.ray_slope(p_px) - lens_m / focus_m;
+        Ray::new(self.camera_position() + lens_m.extend(0.0), direction.extend(1.0))
     }
 }
 
@@ -144,13 +144,13 @@ impl Scene {
         if view.width == 0 || view.height == 0 {
             return;
         }
-        let moment = self.at(time_s);
+        let posed = self.pose_at(time_s);
         let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
         let width = view.width as usize;
         let rows = color.rgb.chunks_exact_mut(3 * width).zip(depth.metres.chunks_exact_mut(width)).enumerate();
         for_each_parallel(rows, threads, |(row, (bytes, metres))| {
             for (column, (bytes, metres)) in bytes.chunks_exact_mut(3).zip(metres).enumerate() {
-                let (light, depth_m) = moment.pinhole_pixel(view, Vec2::new(column as f32, row as f32), &jitter);
+                let (light, depth_m) = posed.pinhole_pixel(view, Vec2::new(column as f32, row as f32), &jitter);
                 bytes.copy_from_slice(&light.to_array().map(encode_srgb));
                 *metres = depth_m;
             }
@@ -164,14 +164,14 @@ impl Scene {
         if view.width == 0 || view.height == 0 {
             return mask;
         }
-        let moment = self.at(time_s);
+        let posed = self.pose_at(time_s);
         let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
         let rows = mask.alpha.chunks_exact_mut(view.width as usize).enumerate();
         for_each_parallel(rows, threads, |(row, alphas)| {
             for (column, alpha) in alphas.iter_mut().enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);
                 let is_subject = |offset: &&Vec2| {
-                    let hit = moment.intersect(&view.pinhole_ray(centre + **offset));
+                    let hit = posed.intersect(&view.pinhole_ray(centre + **offset));
                     hit.is_some_and(|hit| self.parts[hit.part].is_subject)
                 };
                 *alpha = jitter.iter().filter(is_subject).count() as f32 / jitter.len() as f32;
@@ -190,7 +190,7 @@ impl Scene {
         // A ray through the lens at -u is offset by focal_px * radius_m * (1 / focus_m - 1 / z) u px at depth z, which
         // is c(z) u.
         let radius_m = lens.coc_at_infinity_px * lens.focus_m / view.focal_px;
-        let moment = self.at(time_s);
+        let posed = self.pose_at(time_s);
         let samples: Vec<(Vec2, Vec2)> = (0..)
             .zip(lens.aperture)
             .map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(-u.x as f32, u.y as f32)))
@@ -201,7 +201,7 @@ impl Scene {
             for (column, (clipped, hdr)) in clipped.iter_mut().zip(hdr).enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);
                 for (jitter, lens_m) in &samples {
-                    let (light, _) = moment.trace_ray(&view.lens_ray(centre + *jitter, *lens_m, lens.focus_m));
+                    let (light, _) = posed.trace_ray(&view.lens_ray(centre + *jitter, *lens_m, lens.focus_m));
                     *clipped += light.min(Vec3::ONE);
                     *hdr += light;
                 }
@@ -213,7 +213,7 @@ impl Scene {
     }
 }
 
-impl Moment<'_> {
+impl PosedScene<'_> {
     /// Returns the mean of the pixel's rays, each clipped to white, and the depth along the first one, through the
     /// centre.
     fn pinhole_pixel(&self, view: &View, centre: Vec2, jitter: &[Vec2]) -> (Vec3, f32) {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3};
 
-use super::grid::{Distance, Grid};
-use super::ray::{Bounds, Ray};
+use super::grid::{DistanceFn, DistanceGrid};
+use super::ray::{BoundingBox, Ray};
 
 /// A closed or open surface.
 #[derive(Clone, Debug)]
@@ -58,16 +58,16 @@ pub enum Shape {
     },
     /// The zero set of a distance function inside a box.
     Field {
-        distance: Distance,
+        distance: DistanceFn,
         /// The box to search.
-        bounds: Bounds,
+        bounds: BoundingBox,
         /// A grid of the function, accurate to a cell: sphere tracing uses it away from the surface.
-        guide: Arc<Grid>,
+        guide: Arc<DistanceGrid>,
     },
 }
 
 /// The outline of a [`Shape::Quad`] that fills its parallelogram.
-pub fn whole(_: Vec2) -> bool {
+pub fn keep_whole(_: Vec2) -> bool {
     true
 }
 
@@ -83,24 +83,28 @@ impl Shape {
     }
 
     /// Returns a bounding box of the shape.
-    pub fn bounds(&self) -> Bounds {
+    pub fn bounds(&self) -> BoundingBox {
         match *self {
-            Shape::Quad { centre, right, up, .. } => Bounds::around(centre, right.abs() + up.abs() + Vec3::splat(1e-4)),
-            Shape::Sphere { centre, radius } => Bounds::around(centre, Vec3::splat(radius)),
+            Shape::Quad { centre, right, up, .. } => {
+                BoundingBox::from_center(centre, right.abs() + up.abs() + Vec3::splat(1e-4))
+            }
+            Shape::Sphere { centre, radius } => BoundingBox::from_center(centre, Vec3::splat(radius)),
             Shape::Ellipsoid { centre, to_unit } => {
                 let m = to_unit.inverse().transpose();
-                Bounds::around(centre, Vec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length()))
+                BoundingBox::from_center(centre, Vec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length()))
             }
-            Shape::Cuboid { centre, axes, half } => Bounds::around(
+            Shape::Cuboid { centre, axes, half } => BoundingBox::from_center(
                 centre,
                 axes.x_axis.abs() * half.x + axes.y_axis.abs() * half.y + axes.z_axis.abs() * half.z,
             ),
-            Shape::Cone { a, b, radius_a, radius_b } => {
-                Bounds::around(a, Vec3::splat(radius_a)).join(Bounds::around(b, Vec3::splat(radius_b)))
-            }
+            Shape::Cone { a, b, radius_a, radius_b } => BoundingBox::from_center(a, Vec3::splat(radius_a))
+                .union(BoundingBox::from_center(b, Vec3::splat(radius_b))),
             Shape::Frustum { base, height, low_radius, high_radius } => {
                 let radius = low_radius.max(high_radius);
-                Bounds { low: base - Vec3::new(radius, 0.0, radius), high: base + Vec3::new(radius, height, radius) }
+                BoundingBox {
+                    low: base - Vec3::new(radius, 0.0, radius),
+                    high: base + Vec3::new(radius, height, radius),
+                }
             }
             Shape::Field { bounds, .. } => bounds,
         }
@@ -112,7 +116,7 @@ impl Shape {
         let t = match *self {
             Shape::Quad { centre, right, up, cut } => intersect_quad(ray, centre, right, up, cut)?,
             Shape::Sphere { centre, radius } => {
-                let (p, along_m) = ray.near(centre);
+                let (p, along_m) = ray.closest_point(centre);
                 let h = radius * radius - (p - centre).length_squared();
                 if h < 0.0 {
                     return None;
@@ -120,7 +124,7 @@ impl Shape {
                 (along_m - h.sqrt()) / ray.length
             }
             Shape::Ellipsoid { centre, to_unit } => {
-                let (p, along_m) = ray.near(centre);
+                let (p, along_m) = ray.closest_point(centre);
                 let (o, d) = (to_unit * (p - centre), to_unit * ray.unit);
                 let (a, b) = (d.length_squared(), o.dot(d));
                 // Computing the line's distance from the centre at its own foot point preserves precision.
@@ -227,7 +231,7 @@ fn intersect_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f
 /// Returns metres along the ray to a cone with round ends (I. Quilez's rounded cone): first its side, then the two
 /// balls.
 fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Option<f32> {
-    let (origin, along_m) = ray.near(0.5 * (a + b));
+    let (origin, along_m) = ray.closest_point(0.5 * (a + b));
     let (ab, oa, ob, d) = (b - a, origin - a, origin - b, ray.unit);
     let shrink = radius_a - radius_b;
     let (m0, m1, m2, m3, m5) = (ab.length_squared(), ab.dot(oa), ab.dot(d), d.dot(oa), oa.length_squared());
@@ -256,7 +260,7 @@ fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> 
 
 /// Returns the first of the two hits on the infinite cone between the rims; the inside counts as well.
 fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius: f32) -> Option<f32> {
-    let (start, along_m) = ray.near(base + 0.5 * height * Vec3::Y);
+    let (start, along_m) = ray.closest_point(base + 0.5 * height * Vec3::Y);
     let (o, d) = (start - base, ray.unit);
     let slope = (high_radius - low_radius) / height;
     let (radius, growth) = (low_radius + slope * o.y, slope * d.y);
@@ -276,11 +280,17 @@ fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_r
 
 /// Sphere tracing (Hart 1996): steps by the guide while it is safely away from the surface, which saves evaluations of
 /// the distance function.
-fn intersect_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
-    let (mut t, leave) = bounds.span(ray, t_max)?;
+fn intersect_field(
+    ray: &Ray,
+    distance: DistanceFn,
+    bounds: &BoundingBox,
+    guide: &DistanceGrid,
+    t_max: f32,
+) -> Option<f32> {
+    let (mut t, leave) = bounds.intersect_ray(ray, t_max)?;
     for _ in 0..FIELD_STEPS {
         let p = ray.at(t);
-        let safe_m = guide.gap_m(p) - guide.cell_m();
+        let safe_m = guide.distance_m(p) - guide.cell_m();
         let gap_m = if safe_m > guide.cell_m() { safe_m } else { distance(p) };
         if gap_m < FIELD_TOLERANCE_M {
             return Some(t);

@@ -11,14 +11,14 @@ mod play;
 mod rivals;
 
 use claims::{BUDGET, Outcome, cases};
-use rivals::Ours;
+use rivals::GovernorRule;
 
 /// All claims but the comparisons with rivals, which take twelve times as long.
 #[test]
 fn the_governor_keeps_what_is_claimed_of_it_on_every_machine() {
     for case in cases() {
-        let ours = case.play(101..=140, 20, |known| Box::new(Ours::new(known, BUDGET)));
-        let broken = case.broken(&Outcome { ours, pids: Vec::new(), equal: None });
+        let ours = case.simulate(101..=140, 20, |known| Box::new(GovernorRule::new(known, BUDGET)));
+        let broken = case.find_violations(&Outcome { ours, pids: Vec::new(), equal: None });
         assert!(broken.is_empty(), "{}: {broken:?}", case.name);
     }
 }

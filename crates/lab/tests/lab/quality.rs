@@ -35,7 +35,7 @@ use glam::Vec2;
 
 use damage::Damage;
 use lens::{Rgba, Scene, Surface};
-use picture::{Plane, Rgb, decode, encode};
+use picture::{Plane, Rgb, decode_srgb, encode_srgb};
 
 const SIZE: (usize, usize) = (72, 56);
 
@@ -45,7 +45,7 @@ fn color(of: impl Fn(u32, u32) -> [u8; 3]) -> ColorImage {
 }
 
 fn surface(coc_px: f32, slope: Vec2, of: impl Fn(Vec2) -> Rgba + Sync) -> Surface {
-    Surface { coc_px, slope, texture: texture::texture(SIZE, 0, of), margin_px: 0 }
+    Surface { coc_px, slope, texture: texture::render_texture(SIZE, 0, of), margin_px: 0 }
 }
 
 fn scene(shape: Shape, surfaces: Vec<Surface>) -> Scene {
@@ -55,13 +55,15 @@ fn scene(shape: Shape, surfaces: Vec<Surface>) -> Scene {
 
 /// Returns three surfaces with edges, one of them slanted, with the CoC scaled by `strength`.
 fn layers(strength: f32, of: impl Fn(Vec2) -> Rgb + Copy + Sync) -> Scene {
-    let cut = |p: Vec2, radius: f32| texture::coverage(texture::disc(p, Vec2::new(30.0, 25.0), radius));
+    let cut = |p: Vec2, radius: f32| {
+        texture::coverage_from_distance(texture::disc_distance(p, Vec2::new(30.0, 25.0), radius))
+    };
     scene(
         Shape::Disc,
         vec![
-            surface(9.0 * strength, Vec2::new(0.05, 0.02) * strength, |p| texture::premultiplied(of(p), 1.0)),
-            surface(0.0, Vec2::ZERO, |p| texture::premultiplied(of(p), cut(p, 15.0))),
-            surface(-6.0 * strength, Vec2::ZERO, |p| texture::premultiplied(of(p), cut(p, 6.0))),
+            surface(9.0 * strength, Vec2::new(0.05, 0.02) * strength, |p| texture::premultiply(of(p), 1.0)),
+            surface(0.0, Vec2::ZERO, |p| texture::premultiply(of(p), cut(p, 15.0))),
+            surface(-6.0 * strength, Vec2::ZERO, |p| texture::premultiply(of(p), cut(p, 6.0))),
         ],
     )
 }
@@ -75,8 +77,8 @@ fn equal_pictures_are_equal_by_every_metric() {
     let image = color(|x, y| [(x * 4) as u8, (y * 5) as u8, (x * y % 256) as u8]);
     assert_eq!(metrics::psnr(&image, &image, None), f64::INFINITY);
     assert!((metrics::ssim(&image, &image) - 1.0).abs() < 1e-12);
-    assert_eq!(flip::flip(&image, &image), 0.0);
-    assert_eq!(metrics::flicker(&[image.clone(), image], |_| true), 0.0);
+    assert_eq!(flip::mean_flip(&image, &image), 0.0);
+    assert_eq!(metrics::mean_flicker(&[image.clone(), image], |_| true), 0.0);
 }
 
 #[test]
@@ -98,7 +100,7 @@ fn flip_agrees_with_its_authors_program() {
     for (a, b, expected) in
         [(&ramp, &checked, 0.218017), (&step(32), &step(35), 0.082034), (&ramp, &step(32), 0.815419)]
     {
-        let found = flip::flip(a, b);
+        let found = flip::mean_flip(a, b);
         assert!((found - expected).abs() < 1e-3, "{found} instead of {expected}");
     }
 }
@@ -114,15 +116,15 @@ fn ssim_falls_with_contrast_as_in_its_formula() {
 #[test]
 fn a_constant_scene_is_constant_through_the_lens() {
     let constant = [0.3, 0.6, 0.1];
-    let seen = layers(1.0, |_| constant).through_lens(200);
+    let seen = layers(1.0, |_| constant).render_thin_lens(200);
     assert!(seen.data.iter().flatten().zip(constant.iter().cycle()).all(|(a, b)| (a - b).abs() < 2e-3));
 }
 
 #[test]
 fn a_lens_without_an_opening_is_a_pinhole() {
-    let of = |p: Vec2| texture::paint(p, [1.0, 0.8, 0.5], texture::Pattern::Stripes(7.0), 3);
+    let of = |p: Vec2| texture::pattern_color(p, [1.0, 0.8, 0.5], texture::Pattern::Stripes(7.0), 3);
     let scene = layers(0.0, of);
-    assert!(worst(&scene.through_lens(256), &scene.pinhole()) < 0.02);
+    assert!(worst(&scene.render_thin_lens(256), &scene.render_pinhole()) < 0.02);
 }
 
 #[test]
@@ -133,9 +135,11 @@ fn a_far_point_of_light_shows_the_aperture_and_a_near_one_the_same_turned() {
     for (shape, area) in [(Shape::Disc, PI), (triangle, area_of_triangle)] {
         let mut skew = [0.0; 2];
         for (coc_px, skew) in [12.0f32, -12.0].into_iter().zip(&mut skew) {
-            let light = |p: Vec2| [1000.0 * texture::coverage(texture::disc(p, middle, 1.5)), 0.0, 0.0, 1.0];
+            let light = |p: Vec2| {
+                [1000.0 * texture::coverage_from_distance(texture::disc_distance(p, middle, 1.5)), 0.0, 0.0, 1.0]
+            };
             let scene = scene(shape.clone(), vec![surface(coc_px, Vec2::ZERO, light)]);
-            let (sharp, seen) = (scene.pinhole(), scene.through_lens(4000));
+            let (sharp, seen) = (scene.render_pinhole(), scene.render_thin_lens(4000));
             let total = |of: &Plane<Rgb>| of.data.iter().map(|p| f64::from(p[0])).sum::<f64>();
             assert!((total(&seen) / total(&sharp) - 1.0).abs() < 5e-3, "no light is lost");
             let mean = |of: &dyn Fn(Vec2) -> f32| {
@@ -163,26 +167,26 @@ fn a_far_point_of_light_shows_the_aperture_and_a_near_one_the_same_turned() {
 #[test]
 fn depth_gives_back_the_coc() {
     let scene = layers(1.0, |_| [0.5; 3]);
-    let coc_px = scene.coc();
+    let coc_px = scene.render_coc();
     assert_eq!(coc_px.at(30, 25), -6.0);
     assert_eq!(coc_px.at(18, 25), 0.0);
     let lens = DepthCoc { coc_at_infinity_px: 20.0, focus_m: scenes::FOCUS_M, range_m: 0.0, max_coc_px: 99.0 };
-    let depth = truth::depth(&coc_px, 20.0);
+    let depth = truth::depth_from_coc(&coc_px, 20.0);
     assert!(depth.metres.iter().zip(&coc_px.data).all(|(&z_m, c)| (lens.coc_px(z_m) - c).abs() < 1e-4));
 }
 
 #[test]
 fn rivals_keep_a_constant_picture() {
-    let coc_px = layers(1.0, |_| [0.5; 3]).coc();
+    let coc_px = layers(1.0, |_| [0.5; 3]).render_coc();
     let constant = coc_px.map(|_| [0.2, 0.4, 0.8]);
     let polygon = Shape::Polygon { blades: 5, rotation_deg: 20.0, curvature: 0.0 };
     for blurred in [
-        rivals::scatter(&constant, &coc_px, &Shape::Disc),
-        rivals::scatter(&constant, &coc_px, &polygon),
-        rivals::golden_angle(&constant, &coc_px),
-        rivals::gaussian(&constant, &coc_px),
-        rivals::blended(&constant, &coc_px),
-        rivals::near_focus_far(&constant, &coc_px),
+        rivals::scatter_blur(&constant, &coc_px, &Shape::Disc),
+        rivals::scatter_blur(&constant, &coc_px, &polygon),
+        rivals::golden_angle_blur(&constant, &coc_px),
+        rivals::gaussian_blur(&constant, &coc_px),
+        rivals::blended_blur(&constant, &coc_px),
+        rivals::near_focus_far_blur(&constant, &coc_px),
     ] {
         assert!(worst(&blurred, &constant) < 1e-3);
     }
@@ -190,20 +194,20 @@ fn rivals_keep_a_constant_picture() {
 
 #[test]
 fn rivals_blur_a_plane_as_the_lens_does() {
-    let of = |p: Vec2| texture::premultiplied(texture::paint(p, [1.0; 3], texture::Pattern::Checks(9.0), 3), 1.0);
+    let of = |p: Vec2| texture::premultiply(texture::pattern_color(p, [1.0; 3], texture::Pattern::Checks(9.0), 3), 1.0);
     for (shape, least_db) in
         [(Shape::Disc, 38.0), (Shape::Polygon { blades: 5, rotation_deg: 20.0, curvature: 0.0 }, 36.0)]
     {
         let scene = scene(shape.clone(), vec![surface(7.0, Vec2::ZERO, of)]);
-        let (image, coc_px) = (decode(&encode(&scene.pinhole())), scene.coc());
-        let truth = encode(&scene.through_lens(1000));
-        let mut all = vec![("scatter", rivals::scatter(&image, &coc_px, &shape))];
+        let (image, coc_px) = (decode_srgb(&encode_srgb(&scene.render_pinhole())), scene.render_coc());
+        let truth = encode_srgb(&scene.render_thin_lens(1000));
+        let mut all = vec![("scatter", rivals::scatter_blur(&image, &coc_px, &shape))];
         if shape == Shape::Disc {
-            all.push(("golden", rivals::golden_angle(&image, &coc_px)));
-            all.push(("near, focus, far", rivals::near_focus_far(&image, &coc_px)));
+            all.push(("golden", rivals::golden_angle_blur(&image, &coc_px)));
+            all.push(("near, focus, far", rivals::near_focus_far_blur(&image, &coc_px)));
         }
         for (name, blurred) in all {
-            let db = metrics::psnr(&encode(&blurred), &truth, None);
+            let db = metrics::psnr(&encode_srgb(&blurred), &truth, None);
             assert!(db > least_db, "{name} {shape:?}: {db} dB");
         }
     }
@@ -231,7 +235,7 @@ fn damage_is_as_strong_as_it_says() {
 #[test]
 fn holes_take_the_nearest_depth() {
     let metres = Plane::from_fn(40, 30, |x, _| if (10..20).contains(&x) { 0.0 } else { x as f32 + 1.0 });
-    let filled = damage::filled_nearest(&metres);
+    let filled = damage::fill_from_nearest(&metres);
     assert_eq!((filled.at(14, 3), filled.at(15, 3), filled.at(3, 3)), (10.0, 21.0, 4.0));
 }
 
@@ -239,23 +243,23 @@ fn holes_take_the_nearest_depth() {
 fn every_scene_fits_its_lens() {
     for kind in &scenes::KINDS {
         let scene = (kind.at)(0);
-        let max_px = scene.coc().data.iter().fold(f32::NEG_INFINITY, |most, &c| most.max(c));
+        let max_px = scene.render_coc().data.iter().fold(f32::NEG_INFINITY, |most, &c| most.max(c));
         assert!(max_px < scene.coc_at_infinity_px, "{}: {max_px}", kind.name);
         assert_eq!(scene.size(), scenes::SIZE);
     }
     let moving = scenes::KINDS.iter().filter(|kind| kind.moves);
-    assert!(moving.into_iter().all(|kind| (kind.at)(0).coc() != (kind.at)(1).coc()));
+    assert!(moving.into_iter().all(|kind| (kind.at)(0).render_coc() != (kind.at)(1).render_coc()));
 }
 
 #[test]
 fn the_profile_of_a_known_disc_is_found() {
     let light = |rho: f32| if rho < highlight::COC_PX { 0.4 } else { 0.0 };
-    let wall = decode(&ColorImage { width: 1, height: 1, rgb: vec![60; 3] }).data[0][0];
+    let wall = decode_srgb(&ColorImage { width: 1, height: 1, rgb: vec![60; 3] }).data[0][0];
     let middle = Vec2::new(319.5, 179.5);
     let picture = Plane::from_fn(640, 360, |x, y| [wall + light(middle.distance(Vec2::new(x as f32, y as f32))); 3]);
-    let profile = highlight::profile(&encode(&picture));
+    let profile = highlight::measure_profile(&encode_srgb(&picture));
     assert!(profile.ripple_percent < 1e-3 && profile.rim_px < 1.0 && profile.lowest_percent == 0.0, "{profile:?}");
-    let mut dark = encode(&picture);
+    let mut dark = encode_srgb(&picture);
     dark.rgb[..3].copy_from_slice(&[50; 3]);
-    assert!(highlight::profile(&dark).lowest_percent < -20.0);
+    assert!(highlight::measure_profile(&dark).lowest_percent < -20.0);
 }

@@ -23,7 +23,7 @@ fn light_at(depth_m: f32, radius_px: f32) -> PointLight {
 /// Renders the light through an aperture.
 fn blurred(light: PointLight, points: &[DVec2]) -> LinearImage {
     let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, aperture: points };
-    Scene::lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2).hdr
+    Scene::point_lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2).hdr
 }
 
 /// Returns the moments of a picture about the optical axis: the mean position and the mean squared distance.
@@ -89,7 +89,7 @@ fn light_is_neither_made_nor_lost_and_clipping_comes_before_the_lens() {
     let disc = lens_points(&of(Shape::Disc), 2000);
     let lens = ThinLens { coc_at_infinity_px: 6.0, focus_m: FOCUS_M, aperture: &disc };
     let light = light_at(3.0, 2.0);
-    let picture = Scene::lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2);
+    let picture = Scene::point_lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2);
     let total = |image: &LinearImage| image.rgb.iter().map(|light| f64::from(light.x)).sum::<f64>();
     let area_px = std::f64::consts::PI * 2.0f64.powi(2);
     assert!((total(&picture.clipped) / area_px - 1.0).abs() < 0.02, "{}", total(&picture.clipped));
@@ -102,7 +102,7 @@ fn the_right_eye_sees_a_plane_shifted_by_focal_length_times_baseline_over_depth(
     let view = View { width: 160, height: 60, focal_px: 400.0, camera_offset_m: 0.0 };
     let disparity_px = (view.focal_px * baseline_m / depth_m) as usize;
     assert_eq!(disparity_px, 12);
-    let scene = Scene::wall(depth_m);
+    let scene = Scene::mottled_wall(depth_m);
     let (left, depth) = pinhole(&scene, &view, 0.0, 4);
     let (right, _) = pinhole(&scene, &view.right_camera(baseline_m), 0.0, 4);
     assert!(depth.metres.iter().all(|z_m| (z_m - depth_m).abs() < 1e-5));
@@ -158,7 +158,7 @@ fn the_subject_is_where_the_focus_is_and_something_is_in_front_and_behind() {
 
 #[test]
 fn empty_pictures_and_apertures_are_answered() {
-    let scene = Scene::wall(1.0);
+    let scene = Scene::mottled_wall(1.0);
     let (color, depth) = pinhole(&scene, &View::new(0, 7), 0.0, 1);
     assert!(color.rgb.is_empty() && depth.metres.is_empty());
     let lens = ThinLens { coc_at_infinity_px: 2.0, focus_m: 1.0, aperture: &[] };

@@ -10,7 +10,7 @@ fn press(key: Key, modifiers: Modifiers) -> Event {
 }
 
 fn does(state: &State, key: Key, modifiers: Modifiers) -> Option<Action> {
-    action(&press(key, modifiers), state, CONTEXT, false)
+    action_for_event(&press(key, modifiers), state, CONTEXT, false)
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn switches_toggle() {
         (Key::P, |state| state.panel),
         (Key::Space, |state| state.panel),
         (Key::I, |state| state.instruments),
-        (Key::H, |state| state.bare),
+        (Key::H, |state| state.controls_hidden),
         (Key::F, |state| state.full_screen),
         (Key::F11, |state| state.full_screen),
         (Key::F1, |state| state.help),
@@ -120,11 +120,11 @@ fn looks_change_by_keys() {
         Some(Action::Look { look, stroke: Some(_) }) => *look,
         other => panic!("{key:?}: {other:?}"),
     };
-    let amount = |key: Key| tweak::amount(&changed(key), 720).unwrap();
-    let now = tweak::amount(&state.look, 720).unwrap();
+    let amount = |key: Key| tweak::coc_fraction(&changed(key), 720).unwrap();
+    let now = tweak::coc_fraction(&state.look, 720).unwrap();
     assert!(amount(Key::OpenBracket) < now && amount(Key::CloseBracket) > now);
     let mut lens = state.clone();
-    lens.look.strength = bokehcam::look::Strength::Lens(tweak::LENS);
+    lens.look.strength = bokehcam::look::Strength::Lens(tweak::DEFAULT_LENS);
     let with_lens = |key: Key| match does(&lens, key, Modifiers::NONE) {
         Some(Action::Look { look, .. }) => *look,
         other => panic!("{key:?}: {other:?}"),
@@ -146,28 +146,28 @@ fn only_some_keys_repeat_and_some_belong_to_a_control_in_focus() {
     let state = state();
     let repeated = |key: Key| {
         let event = Event::Key { key, physical_key: None, pressed: true, repeat: true, modifiers: Modifiers::NONE };
-        action(&event, &state, CONTEXT, false)
+        action_for_event(&event, &state, CONTEXT, false)
     };
     assert!(repeated(Key::CloseBracket).is_some() && repeated(Key::ArrowUp).is_some());
     assert!(repeated(Key::M).is_none() && repeated(Key::V).is_none());
-    let focused = |key: Key| action(&press(key, Modifiers::NONE), &state, CONTEXT, true);
+    let focused = |key: Key| action_for_event(&press(key, Modifiers::NONE), &state, CONTEXT, true);
     assert!(focused(Key::ArrowUp).is_none() && focused(Key::Space).is_none() && focused(Key::Escape).is_none());
     assert!(focused(Key::M).is_some());
     let released =
         Event::Key { key: Key::M, physical_key: None, pressed: false, repeat: false, modifiers: Modifiers::NONE };
-    assert_eq!(action(&released, &state, CONTEXT, false), None);
+    assert_eq!(action_for_event(&released, &state, CONTEXT, false), None);
 }
 
 #[test]
 fn escape_closes_one_thing_after_the_other() {
     let mut state = state();
-    (state.help, state.bare, state.full_screen, state.panel) = (true, true, true, true);
+    (state.help, state.controls_hidden, state.full_screen, state.panel) = (true, true, true, true);
     let mut closed = Vec::new();
     while let Some(action) = does(&state, Key::Escape, Modifiers::NONE) {
         closed.push(action.clone());
         state.apply(action);
     }
-    let all = [Action::Help(false), Action::Bare(false), Action::FullScreen(false), Action::Panel(false)];
+    let all = [Action::Help(false), Action::HideControls(false), Action::FullScreen(false), Action::Panel(false)];
     assert_eq!(closed, all);
 }
 

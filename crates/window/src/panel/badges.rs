@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use egui::{Align2, Color32, Context, Id, LayerId, Order, vec2};
 
-use super::dock::room;
+use super::dock::picture_area;
 use super::icons;
 use super::marks::draw_label;
 use super::state::State;
-use super::theme::{GAP, ON_PICTURE};
+use super::theme::{GAP, OVERLAY_COLOR};
 use crate::texts::tr;
 
 /// Red that is bright enough for a dot on a dark badge.
-const LIVE: Color32 = Color32::from_rgb(255, 90, 80);
+const ACTIVE_COLOR: Color32 = Color32::from_rgb(255, 90, 80);
 
 /// Start times of the active outputs and of a pending look change, in egui's seconds.
 #[derive(Debug, Default)]
@@ -39,25 +39,25 @@ impl Badges {
             Some(bytes) => format!("{text}, {}", format_size(bytes)),
             None => text,
         };
-        self.change_since_s = state.between.then(|| self.change_since_s.unwrap_or(now_s));
+        self.change_since_s = state.is_transitional.then(|| self.change_since_s.unwrap_or(now_s));
         let is_late = self.change_since_s.is_some_and(|since_s| now_s - since_s >= MIN_SHOWN_S);
-        if state.between && !is_late {
+        if state.is_transitional && !is_late {
             ctx.request_repaint_after(Duration::from_secs_f64(MIN_SHOWN_S));
         }
         let all = [
-            (recording.map(sized), LIVE),
-            (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
-            (state.off.then(|| tr("Off: a still card is shown").to_owned()), ON_PICTURE),
-            (freeze_text(state).map(|text| tr(text).to_owned()), ON_PICTURE),
-            (is_late.then(|| tr("Working…").to_owned()), ON_PICTURE),
+            (recording.map(sized), ACTIVE_COLOR),
+            (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), ACTIVE_COLOR),
+            (state.off.then(|| tr("Off: a still card is shown").to_owned()), OVERLAY_COLOR),
+            (freeze_text(state).map(|text| tr(text).to_owned()), OVERLAY_COLOR),
+            (is_late.then(|| tr("Working…").to_owned()), OVERLAY_COLOR),
         ];
         if self.recording_s.or(self.camera_s).is_some() {
             ctx.request_repaint_after(Duration::from_secs(1));
         }
         let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
         // Leaves room for the button that reopens the panel.
-        let reserved = if state.panel || state.bare { 0.0 } else { icons::SIDE + 14.0 };
-        let mut corner = room(ctx).right_top() + vec2(-GAP - reserved, GAP);
+        let reserved = if state.panel || state.controls_hidden { 0.0 } else { icons::ICON_SIZE + 14.0 };
+        let mut corner = picture_area(ctx).right_top() + vec2(-GAP - reserved, GAP);
         for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
             corner.y += draw_label(&painter, corner, Align2::RIGHT_TOP, &text, Some(color)).height() + 6.0;
         }

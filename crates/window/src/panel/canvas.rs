@@ -3,15 +3,15 @@
 use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 
 use super::marks::{self, TiltHandle};
-use super::place::{Place, fit_scale};
 use super::state::{Action, Shown, State, tweak};
+use super::viewport::{Viewport, fit_scale};
 use crate::texts::tr;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Effect;
 use bokehcam::look::Look;
 
 /// Duration of the ring at a click, in seconds.
-pub const RING_S: f64 = 0.9;
+pub const CLICK_RING_S: f64 = 0.9;
 /// Scroll distance that doubles the blur, in points.
 const WHEEL_TO_DOUBLE: f32 = 300.0;
 /// Zoom gesture per zoom step, as a power of two: a pinch of this factor, or a notch of Ctrl+wheel.
@@ -32,97 +32,111 @@ pub struct Gestures {
 }
 
 impl Gestures {
-    /// Handles the gestures on the picture and draws the marks on it. A touch that only reopens the panel (`waking`) is
+    /// Handles the gestures on the picture and draws the marks on it. A touch that only reopens the panel (`is_wake_touch`) is
     /// not a click.
-    pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, waking: bool, actions: &mut Vec<Action>) {
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        state: &State,
+        viewport: Viewport,
+        is_wake_touch: bool,
+        actions: &mut Vec<Action>,
+    ) {
         // Not focusable with Tab: the arrow keys replace the click for keyboard users.
-        let response = ui.interact(place.visible, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
+        let response = ui.interact(viewport.visible, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, tr("Picture: a click focuses there")));
-        let line = split_line(ui, state, &place);
-        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
+        let line = drag_split_line(ui, state, &viewport);
+        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.controls_hidden;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
-        if !on_line && !waking {
-            self.click(&response, state, &place, actions);
+        if !on_line && !is_wake_touch {
+            self.handle_click(&response, state, &viewport, actions);
         }
         if is_tilt {
-            self.drag_tilt(ui, &response, state, &place, actions);
+            self.drag_tilt(ui, &response, state, &viewport, actions);
         }
         if response.hovered() {
-            blur_by_wheel(ui, state, &place, actions);
-            self.zoom(ui, state, &place, actions);
+            change_blur_by_wheel(ui, state, &viewport, actions);
+            self.zoom_by_gesture(ui, state, &viewport, actions);
         }
         if state.zoom.factor > 0 && !on_line && self.grabbed.is_none() {
-            pan(&response, &place, actions);
+            pan_by_drag(&response, &viewport, actions);
         }
-        self.draw(ui, state, &place, is_tilt, on_line);
+        self.draw_marks(ui, state, &viewport, is_tilt, on_line);
         if let Some(at) = line.filter(Response::dragged).and_then(|line| line.interact_pointer_pos()) {
-            let fraction = (at.x - place.rect.left()) / place.rect.width();
+            let fraction = (at.x - viewport.rect.left()) / viewport.rect.width();
             actions.push(Action::Split(Some(fraction.clamp(0.0, 1.0))));
         }
     }
 
     /// Focuses at the click, or moves the tilt-shift band there; a double click tracks the object there.
-    fn click(&mut self, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
+    fn handle_click(&mut self, response: &Response, state: &State, viewport: &Viewport, actions: &mut Vec<Action>) {
         let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked()) else { return };
         let mut look = state.look.clone();
-        let [x, y] = place.to_fractions(at);
+        let [x, y] = viewport.to_fractions(at);
         if look.effect == Effect::TiltShift {
-            look.tilt.center_y = marks::center_through(&look.tilt, place.size, [x, y]);
+            look.tilt.center_y = marks::center_y_through(&look.tilt, viewport.size, [x, y]);
         // A double click shortly after another click is reported as a triple click.
         } else if response.double_clicked() || response.triple_clicked() {
-            look.focus = tweak::track(x, y);
+            look.focus = tweak::focus_on_tracked(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         } else {
-            look.focus = tweak::point(x, y);
+            look.focus = tweak::focus_on_point(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         }
         push_look(actions, state, look, "picture click");
     }
 
     /// Drags the tilt-shift mark that was pressed.
-    fn drag_tilt(&mut self, ui: &Ui, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
+    fn drag_tilt(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        state: &State,
+        viewport: &Viewport,
+        actions: &mut Vec<Action>,
+    ) {
         if response.drag_started() {
             let origin = ui.input(|input| input.pointer.press_origin());
-            self.grabbed = origin.and_then(|at| marks::handle_at(&state.look.tilt, place, at));
+            self.grabbed = origin.and_then(|at| marks::handle_at(&state.look.tilt, viewport, at));
         }
         if !response.dragged() {
             self.grabbed = None;
         }
         if let (Some(grabbed), Some(at)) = (self.grabbed, response.interact_pointer_pos()) {
             let mut look = state.look.clone();
-            marks::drag_handle(&mut look.tilt, grabbed, place, at);
+            marks::drag_handle(&mut look.tilt, grabbed, viewport, at);
             push_look(actions, state, look, grabbed.stroke());
         }
     }
 
     /// Zooms in steps by Ctrl+wheel or pinch. Zoom steps by key are also centred on the pointer.
-    fn zoom(&mut self, ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
+    fn zoom_by_gesture(&mut self, ui: &Ui, state: &State, viewport: &Viewport, actions: &mut Vec<Action>) {
         let (factor, at) = ui.input(|input| (input.zoom_delta(), input.pointer.hover_pos()));
-        let here = at.map(|at| place.to_fractions(at));
+        let center = at.map(|at| viewport.to_fractions(at));
         for action in actions.iter_mut() {
             if let Action::Zoom(_, at @ None) = action {
-                *at = here;
+                *at = center;
             }
         }
         self.zoom_log2 += factor.log2();
         if self.zoom_log2.abs() >= ZOOM_STEP_LOG2 {
             let step = self.zoom_log2.signum() as i32;
             self.zoom_log2 = 0.0;
-            let size = (place.size.x as u32, place.size.y as u32);
-            actions.push(Action::Zoom(state.zoom.stepped(step, fit_scale(ui.ctx(), size)), here));
+            let size = (viewport.size.x as u32, viewport.size.y as u32);
+            actions.push(Action::Zoom(state.zoom.next_factor(step, fit_scale(ui.ctx(), size)), center));
         }
     }
 
     /// Draws the marks on the picture: crop, split line, tilt-shift band, focus point, and click ring.
-    fn draw(&mut self, ui: &Ui, state: &State, place: &Place, is_tilt: bool, line_held: bool) {
-        let painter = ui.painter().with_clip_rect(place.visible);
+    fn draw_marks(&mut self, ui: &Ui, state: &State, viewport: &Viewport, is_tilt: bool, is_line_held: bool) {
+        let painter = ui.painter().with_clip_rect(viewport.visible);
         let now = ui.input(|input| input.time);
-        if state.bare {
+        if state.controls_hidden {
             return;
         }
         // Auto-framing: outputs get this crop.
-        if let Some(part) = state.part.filter(|_| state.look.follow.zoom().is_some()) {
-            marks::draw_crop(&painter, place, &part);
+        if let Some(part) = state.crop.filter(|_| state.look.follow.zoom().is_some()) {
+            marks::draw_crop(&painter, viewport, &part);
         }
         if let Some(at) = state.split {
             let after = match state.shown {
@@ -131,20 +145,20 @@ impl Gestures {
                 Shown::Coc => "Blur radius",
                 Shown::Bins => "Layers",
             };
-            marks::draw_split(&painter, place, at, line_held, after);
+            marks::draw_split(&painter, viewport, at, is_line_held, after);
         }
         if is_tilt {
             let pointer = ui.input(|input| input.pointer.hover_pos());
-            let near = self.grabbed.or_else(|| pointer.and_then(|at| marks::handle_at(&state.look.tilt, place, at)));
-            marks::draw_tilt(&painter, &state.look.tilt, place, near);
+            let near = self.grabbed.or_else(|| pointer.and_then(|at| marks::handle_at(&state.look.tilt, viewport, at)));
+            marks::draw_tilt(&painter, &state.look.tilt, viewport, near);
         }
         if let (FocusRule::Point { x, y }, Effect::Auto) = (state.look.focus, state.look.effect) {
-            marks::draw_focus_point(&painter, place.to_screen([x, y]));
+            marks::draw_focus_point(&painter, viewport.to_screen([x, y]));
         }
         if let Some((at, clicked_s)) = self.ring {
-            let age = (now - clicked_s) / RING_S;
+            let age = (now - clicked_s) / CLICK_RING_S;
             if age < 1.0 {
-                marks::draw_ring(&painter, place.to_screen(at), age.max(0.0) as f32);
+                marks::draw_ring(&painter, viewport.to_screen(at), age.max(0.0) as f32);
                 ui.ctx().request_repaint_after_secs(1.0 / 30.0);
             } else {
                 self.ring = None;
@@ -154,13 +168,13 @@ impl Gestures {
 }
 
 /// Returns the draggable area of the split line; `None` without a split.
-fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
+fn drag_split_line(ui: &mut Ui, state: &State, viewport: &Viewport) -> Option<Response> {
     let at = state.split?;
-    let x = place.rect.left() + at * place.rect.width();
+    let x = viewport.rect.left() + at * viewport.rect.width();
     // egui hit-tests the next press against this pass: without a pointer, that press will come from a finger.
     let hold = if ui.input(|input| input.pointer.has_pointer()) { GRAB_RADIUS } else { FINGER_GRAB_RADIUS };
-    let rect = Rect::from_x_y_ranges(x - hold..=x + hold, place.visible.y_range());
-    if !place.visible.intersects(rect) {
+    let rect = Rect::from_x_y_ranges(x - hold..=x + hold, viewport.visible.y_range());
+    if !viewport.visible.intersects(rect) {
         return None;
     }
     let line = ui.interact(rect, Id::unique("split line"), Sense::DRAG);
@@ -168,21 +182,21 @@ fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
 }
 
 /// Pans the zoomed picture by dragging.
-fn pan(response: &Response, place: &Place, actions: &mut Vec<Action>) {
+fn pan_by_drag(response: &Response, viewport: &Viewport, actions: &mut Vec<Action>) {
     let by = response.drag_delta();
     if response.dragged() && by != egui::Vec2::ZERO {
         // Starts from the clamped position that is visible, not from the requested one: dragging past an edge has no
         // effect.
-        actions.push(Action::Pan(place.to_fractions(place.visible.center() - by)));
+        actions.push(Action::Pan(viewport.to_fractions(viewport.visible.center() - by)));
     }
 }
 
 /// Changes the blur amount by the wheel.
-fn blur_by_wheel(ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
+fn change_blur_by_wheel(ui: &Ui, state: &State, viewport: &Viewport, actions: &mut Vec<Action>) {
     let turned = ui.input(|input| if input.modifiers.any() { 0.0 } else { input.smooth_scroll_delta().y });
     if turned != 0.0 {
         let mut look = state.look.clone();
-        tweak::blur_by(&mut look, (turned / WHEEL_TO_DOUBLE).exp2(), place.size.y as u32);
+        tweak::scale_blur(&mut look, (turned / WHEEL_TO_DOUBLE).exp2(), viewport.size.y as u32);
         push_look(actions, state, look, "wheel");
     }
 }

@@ -23,7 +23,7 @@ const MIN_SCALE_RATIO: f32 = 0.75;
 pub struct Dock {
     pub panel: Rect,
     /// Area for the picture and its overlays.
-    pub room: Rect,
+    pub picture_area: Rect,
     /// Number of columns of the first screen's controls.
     pub columns: usize,
 }
@@ -31,24 +31,24 @@ pub struct Dock {
 impl Dock {
     /// Computes the layout in a window for a picture of `size`. `expanded` is whether the panel is expanded, and
     /// scrolls.
-    pub fn of(window: Rect, size: (u32, u32), expanded: bool) -> Self {
-        let (right, bottom) = (Self::at_right(window), Self::at_bottom(window, expanded));
+    pub fn new(window: Rect, size: (u32, u32), expanded: bool) -> Self {
+        let (right, bottom) = (Self::dock_right(window), Self::dock_bottom(window, expanded));
         let scale = |dock: &Self| {
-            let room = dock.room.size();
-            (room.x / size.0.max(1) as f32).min(room.y / size.1.max(1) as f32)
+            let area = dock.picture_area.size();
+            (area.x / size.0.max(1) as f32).min(area.y / size.1.max(1) as f32)
         };
         let is_wide = right.panel.width() >= MIN_CELL_WIDTH + 2.0 * PAD;
         if is_wide && scale(&right) >= MIN_SCALE_RATIO * scale(&bottom) { right } else { bottom }
     }
 
-    fn at_right(window: Rect) -> Self {
+    fn dock_right(window: Rect) -> Self {
         let width = (WIDTH + GAP).min(window.width() / 2.0);
         let at = window.right() - width;
         let panel = Rect::from_min_max(pos2(at, window.top() + GAP), window.max - vec2(GAP, GAP));
-        Self { panel, room: Rect::from_min_max(window.min, pos2(at - GAP, window.bottom())), columns: 1 }
+        Self { panel, picture_area: Rect::from_min_max(window.min, pos2(at - GAP, window.bottom())), columns: 1 }
     }
 
-    fn at_bottom(window: Rect, expanded: bool) -> Self {
+    fn dock_bottom(window: Rect, expanded: bool) -> Self {
         let inner = window.width() - 2.0 * (GAP + PAD);
         let columns = (((inner + CELL_GAP) / (MIN_CELL_WIDTH + CELL_GAP)) as usize).clamp(1, 4);
         let rows = CELLS.div_ceil(columns) as f32;
@@ -57,26 +57,26 @@ impl Dock {
         let height = if expanded { max_height } else { min_height.min(max_height) }.max(0.0);
         let top = window.bottom() - GAP - height;
         let panel = Rect::from_min_max(pos2(window.left() + GAP, top), window.max - vec2(GAP, GAP));
-        Self { panel, room: Rect::from_min_max(window.min, pos2(window.right(), top - GAP)), columns }
+        Self { panel, picture_area: Rect::from_min_max(window.min, pos2(window.right(), top - GAP)), columns }
     }
 }
 
-fn id() -> Id {
+fn picture_area_id() -> Id {
     Id::unique("room of the picture")
 }
 
 /// Stores the area that the panel leaves free.
-pub fn set_room(ctx: &Context, room: Rect) {
-    ctx.data_mut(|data| data.insert_temp(id(), room));
+pub fn set_picture_area(ctx: &Context, area: Rect) {
+    ctx.data_mut(|data| data.insert_temp(picture_area_id(), area));
 }
 
 /// Returns the area that the panel leaves free, for the picture and its overlays.
-pub fn room(ctx: &Context) -> Rect {
-    ctx.data(|data| data.get_temp(id())).unwrap_or_else(|| ctx.content_rect())
+pub fn picture_area(ctx: &Context) -> Rect {
+    ctx.data(|data| data.get_temp(picture_area_id())).unwrap_or_else(|| ctx.content_rect())
 }
 
 /// Returns the size of the free area in pixels of the window.
-pub fn room_px(ctx: &Context) -> (u32, u32) {
-    let Vec2 { x, y } = room(ctx).size().max(Vec2::ZERO) * ctx.pixels_per_point();
+pub fn picture_area_px(ctx: &Context) -> (u32, u32) {
+    let Vec2 { x, y } = picture_area(ctx).size().max(Vec2::ZERO) * ctx.pixels_per_point();
     (x.round() as u32, y.round() as u32)
 }

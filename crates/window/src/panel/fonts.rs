@@ -12,7 +12,7 @@ use egui::epaint::text::{FallbackRequest, FontInsert, FontProvider, InsertFontFa
 use egui::{FontData, FontFamily};
 use skrifa::MetadataProvider;
 
-use super::theme::medium;
+use super::theme::medium_font;
 
 /// Size above which a font file is not read, in bytes.
 const MAX_BYTES: u64 = 64 << 20;
@@ -130,7 +130,7 @@ fn read_font(path: &PathBuf, index: u32, sign: char) -> Option<(FontInsert, impl
     if !has_glyph(sign) {
         return None;
     }
-    let families = [FontFamily::Proportional, FontFamily::Monospace, medium()];
+    let families = [FontFamily::Proportional, FontFamily::Monospace, medium_font()];
     let families =
         families.map(|family| InsertFontFamily { family, priority: egui::epaint::text::FontPriority::Lowest });
     let name = format!("{} {index}", path.display());

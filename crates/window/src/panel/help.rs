@@ -4,9 +4,9 @@ use egui::{Context, Grid, Id, Key, Label, Modal, RichText, ScrollArea, Ui, vec2}
 
 use super::icons::{self, Icon};
 use super::keys::{GROUPS, Group};
-use super::parts::switch;
 use super::state::{Action, State};
-use super::theme::{Colors, GAP, PAD, card, medium};
+use super::theme::{Colors, GAP, PAD, card_frame, medium_font};
+use super::widgets::add_switch;
 use crate::texts::tr;
 
 const GESTURES: [(&str, &str); 9] = [
@@ -30,27 +30,27 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let window = ctx.content_rect();
     let columns = if window.width() > 720.0 { 2 } else { 1 };
     let width = if columns == 2 { 660.0 } else { (window.width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0) };
-    let frame = card(&Colors::of(ctx.theme()));
+    let frame = card_frame(&Colors::for_theme(ctx.theme()));
     let drawn = Modal::new(Id::unique("help")).frame(frame).show(ctx, |ui| {
         ui.set_width(width);
         ui.set_max_height((window.height() - 2.0 * (GAP + PAD)).max(20.0));
         ui.horizontal(|ui| {
             ui.heading(tr("Keys and gestures"));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if icons::button(ui, Icon::Close, "Close (Esc)", true) {
+                if icons::add_button(ui, Icon::Close, "Close (Esc)", true) {
                     actions.push(Action::Help(false));
                 }
             });
         });
         let hint = "If off, shortcuts without Ctrl do nothing: for speech input";
-        if switch(ui, "Single keys", hint, state.habits.single_keys) {
-            actions.push(Action::SingleKeys(!state.habits.single_keys));
+        if add_switch(ui, "Single keys", hint, state.preferences.single_keys) {
+            actions.push(Action::SingleKeys(!state.preferences.single_keys));
         }
         let (asks, hint) = (
-            state.habits.ask_before_closing,
+            state.preferences.ask_before_closing,
             "While something is recorded or used in calls, closing the window asks first",
         );
-        if switch(ui, "Ask before closing", hint, asks) {
+        if add_switch(ui, "Ask before closing", hint, asks) {
             actions.push(Action::AskBeforeClosing(!asks));
         }
         // 100 points for the heading and the two switches.
@@ -94,13 +94,13 @@ fn add_keys(ui: &mut Ui, group: &Group) {
 
 /// Adds a titled table of keys or gestures with their effects.
 fn add_table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);
-    ui.label(RichText::new(tr(name)).family(medium()).color(colors.accent));
+    ui.label(RichText::new(tr(name)).family(medium_font()).color(colors.accent));
     Grid::new(name).num_columns(2).spacing(vec2(12.0, 4.0)).min_col_width(104.0).show(ui, |ui| {
         for (keys, does) in rows {
-            ui.label(RichText::new(tr(keys)).family(medium()));
+            ui.label(RichText::new(tr(keys)).family(medium_font()));
             ui.add(Label::new(RichText::new(tr(does)).color(colors.weak)).wrap());
             ui.end_row();
         }

@@ -5,12 +5,12 @@ use std::f32::consts::TAU;
 use egui::{Color32, CornerRadius, Painter, Pos2, Rect, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo};
 use egui::{Role, vec2};
 
-use super::parts::Hinted;
 use super::theme::Colors;
+use super::widgets::Tooltip;
 use crate::texts::tr;
 
 /// Side of an icon button, in points.
-pub const SIDE: f32 = 26.0;
+pub const ICON_SIZE: f32 = 26.0;
 
 /// The available icons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +34,8 @@ pub enum Icon {
 }
 
 /// Adds an icon button. Returns whether it was clicked.
-pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
-    let colors = Colors::here(ui);
+pub fn add_button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
+    let colors = Colors::for_ui(ui);
     // A button that becomes disabled keeps the focus, so that Tab continues from there.
     let id = ui.scope_id().with(hint);
     let keeps_focus = ui.memory(|memory| memory.has_focus(id));
@@ -44,7 +44,7 @@ pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
         (false, true) => Sense::focusable_noninteractive(),
         (false, false) => Sense::hover(),
     };
-    let (rect, _) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(ICON_SIZE), Sense::hover());
     let response = ui.interact(rect, id, sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, tr(hint)));
     if enabled && response.hovered() {
@@ -52,7 +52,7 @@ pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     }
     let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.45) };
     draw(ui.painter(), icon, rect.center(), color);
-    response.hint(hint).clicked()
+    response.tooltip(hint).clicked()
 }
 
 /// Draws an icon around its centre `at`; offsets are in points.

@@ -8,9 +8,9 @@ use egui::{Align, Align2, Area, Context, Id, Mesh, Order, Rect, RichText, Sense,
 use egui::{pos2, vec2};
 
 use super::cards;
-use super::meters::{FRAMES, Summary};
+use super::meters::{GRAPH_FRAMES, Summary};
 use super::state::{Source, State};
-use super::theme::{Colors, GAP, PAD, medium, quality_color};
+use super::theme::{Colors, GAP, PAD, medium_font, quality_color};
 use crate::texts::{tr, tr_with};
 use bokehcam::budget::Quality;
 
@@ -22,12 +22,12 @@ const UPDATE_PERIOD_S: f64 = 0.2;
 
 /// Cached summary, so that it is not recomputed in every pass.
 #[derive(Default)]
-pub struct Cache {
+pub struct Instruments {
     summary: Summary,
     at_s: f64,
 }
 
-impl Cache {
+impl Instruments {
     /// Draws the instruments.
     pub fn show(&mut self, ctx: &Context, state: &State) {
         let now_s = ctx.input(|input| input.time);
@@ -35,7 +35,7 @@ impl Cache {
             (self.summary, self.at_s) = (state.meters.summary(), now_s);
         }
         ctx.request_repaint_after(Duration::from_millis(200));
-        let window = super::dock::room(ctx);
+        let window = super::dock::picture_area(ctx);
         let area = Area::new(Id::unique("instruments")).fixed_pos(window.min + vec2(GAP, GAP)).order(Order::Middle);
         cards::show(ctx, area.interactable(false), WIDTH, PAD, |ui, _| {
             ui.set_width(ui.available_width());
@@ -46,20 +46,20 @@ impl Cache {
 
     /// Adds the frame rate and quality level, the graph, and one row per number.
     fn add_rows(&self, ui: &mut Ui, state: &State) {
-        let colors = Colors::here(ui);
+        let colors = Colors::for_ui(ui);
         let (budget_ms, executor) = match &state.source {
             Source::Running(running) => (running.budget_ns as f32 / 1e6, running.executor.as_str()),
             Source::Opening | Source::Lost(_) | Source::Ended => (0.0, ""),
         };
         let Summary { fps, latency_ms: [p50, p99], reaction_ms } = self.summary;
         ui.horizontal(|ui| {
-            ui.label(RichText::new(format!("{fps:.1}")).family(medium()).size(22.0));
+            ui.label(RichText::new(format!("{fps:.1}")).family(medium_font()).size(22.0));
             ui.label(RichText::new("fps").color(colors.weak));
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-                let last = state.meters.bars().last().and_then(|bar| bar.quality);
-                let (color, letter) = quality_color(last, theme(ui));
+                let last = state.meters.samples().last().and_then(|bar| bar.quality);
+                let (color, letter) = quality_color(last, active_theme(ui));
                 let name = last.map_or(tr("no blur"), Quality::name);
-                ui.label(RichText::new(format!("{letter} {name}")).color(color).family(medium()));
+                ui.label(RichText::new(format!("{letter} {name}")).color(color).family(medium_font()));
             });
         });
         draw_graph(ui, state, budget_ms);
@@ -82,7 +82,7 @@ impl Cache {
         for &(name, pass_ms) in &stages.passes {
             add_row(ui, &format!("     {name}"), &format_ms(pass_ms));
         }
-        add_row(ui, "Between stages", &format_ms(stages.between_ms));
+        add_row(ui, "Between stages", &format_ms(stages.queueing_ms));
         add_row(ui, "Play-out delay", &format_ms(stages.playout_ms));
         add_row(ui, "Present", &format_ms(stages.present_ms));
         if !executor.is_empty() {
@@ -91,7 +91,7 @@ impl Cache {
     }
 }
 
-fn theme(ui: &Ui) -> Theme {
+fn active_theme(ui: &Ui) -> Theme {
     if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light }
 }
 
@@ -101,7 +101,7 @@ fn format_ms(ms: f64) -> String {
 
 /// Adds a name and a right-aligned value, which wraps if needed.
 fn add_row(ui: &mut Ui, name: &str, value: &str) {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     let (font, width) = (TextStyle::Small.resolve(ui.style()), ui.available_width());
     let name = ui.painter().layout_no_wrap(tr(name).to_owned(), font.clone(), colors.weak);
     let mut job = LayoutJob::simple(value.to_owned(), font, colors.text, (width - name.size().x - GAP).max(0.0));
@@ -131,21 +131,21 @@ fn format_drops(state: &State) -> String {
 /// Draws the graph: one bar per recent frame for its blur time, coloured by quality level, a letter below each run of
 /// frames at the same level, and a line at the budget.
 fn draw_graph(ui: &mut Ui, state: &State, budget_ms: f32) {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), GRAPH_HEIGHT + 16.0), Sense::hover());
     let plot = Rect::from_min_max(rect.min, pos2(rect.right(), rect.top() + GRAPH_HEIGHT));
     let painter = ui.painter().with_clip_rect(rect);
     painter.rect_filled(plot, egui::CornerRadius::same(6), colors.field);
-    let longest_ms = state.meters.bars().map(|bar| bar.blur_ms).fold(0.0, f32::max);
+    let longest_ms = state.meters.samples().map(|bar| bar.blur_ms).fold(0.0, f32::max);
     // Fits the budget and all bars, but a rare bar above three budgets must not flatten the others.
     let top_ms = (1.35 * budget_ms).max(longest_ms.min(3.0 * budget_ms.max(1.0)) * 1.1).max(1.0);
-    let step = plot.width() / FRAMES as f32;
-    let bar_count = state.meters.bars().len();
-    let theme = theme(ui);
+    let step = plot.width() / GRAPH_FRAMES as f32;
+    let bar_count = state.meters.samples().len();
+    let theme = active_theme(ui);
     let mut mesh = Mesh::default();
     // Quality level of the current run of bars, and the x where the run begins.
     let mut run: Option<(Option<Quality>, f32)> = None;
-    let font = egui::FontId::new(11.0, medium());
+    let font = egui::FontId::new(11.0, medium_font());
     let draw_letter = |quality: Option<Quality>, from: f32, to: f32| {
         // Letters are wider than short runs and would overlap.
         if to - from >= 9.0 {
@@ -160,7 +160,7 @@ fn draw_graph(ui: &mut Ui, state: &State, budget_ms: f32) {
         }
     };
     let mut x = plot.right() - bar_count as f32 * step;
-    for bar in state.meters.bars() {
+    for bar in state.meters.samples() {
         let height = (bar.blur_ms / top_ms).min(1.0) * plot.height();
         let at = Rect::from_min_max(pos2(x, plot.bottom() - height), pos2(x + step, plot.bottom()));
         mesh.add_colored_rect(at, quality_color(bar.quality, theme).0);

@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 
 use super::state::State;
-use super::theme::{Colors, GAP, PAD, card};
+use super::theme::{Colors, GAP, PAD, card_frame};
 use super::views::{BIN_COLORS, Legend, depth_fraction, diverging, perceptual};
 use crate::texts::{tr, tr_with};
 
@@ -16,7 +16,7 @@ const STEPS_PER_BAR: usize = 64;
 /// Draws the legend at the left, `above` points from the bottom, unless the window is too small.
 pub fn show(ui: &Ui, state: &State, above: f32) {
     let Some(legend) = state.legend else { return };
-    let window = super::dock::room(ui.ctx());
+    let window = super::dock::picture_area(ui.ctx());
     if window.width() < WIDTH * 1.2 || window.height() < 120.0 {
         return;
     }
@@ -28,25 +28,25 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
     let height = if rows > 0 { 40.0 + 20.0 * rows as f32 } else { 76.0 };
     let rect =
         Rect::from_min_size(pos2(window.left() + GAP, window.bottom() - GAP - above - height), vec2(WIDTH, height));
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     let painter = ui.painter();
     // The card adds its inner margin.
-    painter.add(card(&colors).paint(rect.shrink(PAD)));
+    painter.add(card_frame(&colors).paint(rect.shrink(PAD)));
     let inner = rect.shrink2(vec2(16.0, 10.0));
     let title = |text: &str| {
         let text = tr(text);
-        let font = FontId::new(12.5, super::theme::medium());
+        let font = FontId::new(12.5, super::theme::medium_font());
         painter.text(inner.left_top(), Align2::LEFT_TOP, text, font, colors.text);
     };
     let bar = Rect::from_min_size(inner.min + vec2(0.0, 22.0), vec2(inner.width(), BAR_HEIGHT));
     match legend {
         Legend::Depth { near_m, far_m } => {
-            title(if state.known().is_relative { "Depth: far to near" } else { "Depth in metres" });
+            title(if state.source_depth().is_relative { "Depth: far to near" } else { "Depth in metres" });
             draw_ramp(painter, bar, |fraction| perceptual()[(fraction * 255.0) as usize]);
-            let in_metres = !state.known().is_relative;
-            for metres in nice_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
+            let in_metres = !state.source_depth().is_relative;
+            for metres in round_tick_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
                 let x = bar.left() + depth_fraction(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
-                draw_tick(painter, &colors, bar, x, &meters_label(metres));
+                draw_tick(painter, &colors, bar, x, &format_metres(metres));
             }
         }
         Legend::Coc { max_px } => {
@@ -112,7 +112,7 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
     // White text if the luma (weights 0.3, 0.6, 0.1) is below 120 of 255.
     let dark = u32::from(r) * 3 + u32::from(g) * 6 + u32::from(b) < 1200;
     let ink = if dark { Color32::WHITE } else { Color32::BLACK };
-    let font = FontId::new(11.0, super::theme::medium());
+    let font = FontId::new(11.0, super::theme::medium_font());
     painter.text(swatch.center(), Align2::CENTER_CENTER, index + 1, font, ink);
     let low_px = index.checked_sub(1).map(|before| high_px[before]);
     let number = |px: f32| if px < 0.0 { format!("−{:.1}", -px) } else { format!("{px:.1}") };
@@ -127,7 +127,7 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
 }
 
 /// Returns round distances within a range, in metres from near to far, spaced so that their labels do not overlap.
-pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
+pub fn round_tick_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     const STEPS: [f32; 9] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0];
     // Minimum distance of two labels, as a fraction of the bar's width.
     const MIN_SPACING: f32 = 0.17;
@@ -142,6 +142,6 @@ pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     chosen
 }
 
-fn meters_label(metres: f32) -> String {
+fn format_metres(metres: f32) -> String {
     if metres < 10.0 && metres.fract() > 0.01 { format!("{metres:.1}") } else { format!("{metres:.0}") }
 }

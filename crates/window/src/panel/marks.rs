@@ -4,9 +4,9 @@
 
 use egui::{Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
-use super::place::Place;
 use super::state::tweak::rotate_band;
-use super::theme::{ON_PICTURE, SHADE, medium};
+use super::theme::{OVERLAY_COLOR, OVERLAY_OUTLINE, medium_font};
+use super::viewport::Viewport;
 use crate::texts::tr;
 use bokehcam::frame::crop::Crop;
 use bokehcam::look::Tilt;
@@ -37,13 +37,13 @@ impl TiltHandle {
 }
 
 fn draw_line(painter: &Painter, ends: [Pos2; 2], width: f32) {
-    painter.line_segment(ends, Stroke::new(width + 2.0, SHADE));
-    painter.line_segment(ends, Stroke::new(width, ON_PICTURE));
+    painter.line_segment(ends, Stroke::new(width + 2.0, OVERLAY_OUTLINE));
+    painter.line_segment(ends, Stroke::new(width, OVERLAY_COLOR));
 }
 
 fn draw_dot(painter: &Painter, at: Pos2, radius: f32) {
-    painter.circle_filled(at, radius + 1.5, SHADE);
-    painter.circle_filled(at, radius, ON_PICTURE);
+    painter.circle_filled(at, radius + 1.5, OVERLAY_OUTLINE);
+    painter.circle_filled(at, radius, OVERLAY_COLOR);
 }
 
 /// Draws the click ring, which shrinks and fades as `age` goes from 0 to 1.
@@ -51,13 +51,13 @@ pub fn draw_ring(painter: &Painter, at: Pos2, age: f32) {
     let settle = (age / 0.3).min(1.0);
     let radius = 40.0 - 18.0 * (1.0 - (1.0 - settle) * (1.0 - settle));
     let opacity = ((1.0 - age) / 0.5).min(1.0);
-    painter.circle_stroke(at, radius, Stroke::new(4.0, SHADE.gamma_multiply(opacity)));
-    painter.circle_stroke(at, radius, Stroke::new(2.0, ON_PICTURE.gamma_multiply(opacity)));
+    painter.circle_stroke(at, radius, Stroke::new(4.0, OVERLAY_OUTLINE.gamma_multiply(opacity)));
+    painter.circle_stroke(at, radius, Stroke::new(2.0, OVERLAY_COLOR.gamma_multiply(opacity)));
 }
 
 /// Draws the focus point: the four corners of a square.
 pub fn draw_focus_point(painter: &Painter, at: Pos2) {
-    for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+    for (width, color) in [(3.5, OVERLAY_OUTLINE), (1.5, OVERLAY_COLOR)] {
         for corner in [vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0)] {
             let tip = at + corner * 13.0;
             let points = vec![tip - vec2(corner.x * 6.0, 0.0), tip, tip - vec2(0.0, corner.y * 6.0)];
@@ -67,19 +67,19 @@ pub fn draw_focus_point(painter: &Painter, at: Pos2) {
 }
 
 /// Draws the crop that the outputs get as a dashed rectangle.
-pub fn draw_crop(painter: &Painter, place: &Place, part: &Crop) {
-    let size = place.rect.size() / part.zoom;
-    let rect = Rect::from_center_size(place.to_screen(part.center), size).shrink(1.0);
+pub fn draw_crop(painter: &Painter, viewport: &Viewport, part: &Crop) {
+    let size = viewport.rect.size() / part.zoom;
+    let rect = Rect::from_center_size(viewport.to_screen(part.center), size).shrink(1.0);
     let corners = [rect.left_top(), rect.right_top(), rect.right_bottom(), rect.left_bottom(), rect.left_top()];
-    for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+    for (width, color) in [(3.5, OVERLAY_OUTLINE), (1.5, OVERLAY_COLOR)] {
         painter.extend(Shape::dashed_line(&corners, Stroke::new(width, color), 10.0, 7.0));
     }
 }
 
 /// Draws the line between before (left) and after.
-pub fn draw_split(painter: &Painter, place: &Place, at: f32, held: bool, after: &str) {
-    let x = place.rect.left() + at * place.rect.width();
-    let rect = place.visible;
+pub fn draw_split(painter: &Painter, viewport: &Viewport, at: f32, held: bool, after: &str) {
+    let x = viewport.rect.left() + at * viewport.rect.width();
+    let rect = viewport.visible;
     draw_line(painter, [pos2(x, rect.top()), pos2(x, rect.bottom())], if held { 3.0 } else { 2.0 });
     let grip = pos2(x, rect.center().y);
     draw_dot(painter, grip, if held { 15.0 } else { 13.0 });
@@ -94,32 +94,32 @@ pub fn draw_split(painter: &Painter, place: &Place, at: f32, held: bool, after: 
 
 /// Draws text on a dark field, after a dot if `dot` has a colour. Returns its rectangle.
 pub fn draw_label(painter: &Painter, at: Pos2, align: Align2, text: &str, dot: Option<Color32>) -> Rect {
-    let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium()), ON_PICTURE);
+    let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium_font()), OVERLAY_COLOR);
     let left = if dot.is_some() { 23.0 } else { 8.0 };
     let rect = align.anchor_size(at, galley.size() + vec2(left + 8.0, 8.0));
     painter.rect_filled(rect, CornerRadius::same(9), Color32::from_black_alpha(190));
     if let Some(color) = dot {
         painter.circle_filled(rect.left_center() + vec2(13.0, 0.0), 4.5, color);
     }
-    painter.galley(rect.min + vec2(left, 4.0), galley, ON_PICTURE);
+    painter.galley(rect.min + vec2(left, 4.0), galley, OVERLAY_COLOR);
     rect
 }
 
 /// The tilt-shift band in window coordinates, in points.
-struct Band {
+struct TiltBand {
     middle: Pos2,
     /// Directions along and across the band, scaled to the picture's height.
     along: Vec2,
     across: Vec2,
 }
 
-impl Band {
-    fn new(tilt: &Tilt, place: &Place) -> Self {
+impl TiltBand {
+    fn new(tilt: &Tilt, viewport: &Viewport) -> Self {
         let (sin, cos) = tilt.angle_deg.to_radians().sin_cos();
-        let side = if place.mirror { -1.0 } else { 1.0 };
-        let height = place.rect.height();
+        let side = if viewport.mirror { -1.0 } else { 1.0 };
+        let height = viewport.rect.height();
         Self {
-            middle: place.to_screen([0.5, tilt.center_y]),
+            middle: viewport.to_screen([0.5, tilt.center_y]),
             along: vec2(side * cos, sin) * height,
             across: vec2(side * -sin, cos) * height,
         }
@@ -131,17 +131,17 @@ impl Band {
     }
 
     /// Returns the handle that rotates the band, inside the picture.
-    fn rotation_handle(&self, place: &Place) -> Pos2 {
-        let shorter_side = place.rect.width().min(place.rect.height()) / place.rect.height();
+    fn rotation_handle(&self, viewport: &Viewport) -> Pos2 {
+        let shorter_side = viewport.rect.width().min(viewport.rect.height()) / viewport.rect.height();
         self.middle + self.along * (0.32 * shorter_side)
     }
 }
 
 /// Returns the tilt-shift mark that a press at `at` grabs: a mark nearby, else the band if `at` is inside it.
-pub fn handle_at(tilt: &Tilt, place: &Place, at: Pos2) -> Option<TiltHandle> {
-    let band = Band::new(tilt, place);
+pub fn handle_at(tilt: &Tilt, viewport: &Viewport, at: Pos2) -> Option<TiltHandle> {
+    let band = TiltBand::new(tilt, viewport);
     let near = |mark: Pos2| mark.distance(at) <= GRAB_RADIUS;
-    if near(band.rotation_handle(place)) {
+    if near(band.rotation_handle(viewport)) {
         Some(TiltHandle::Turn)
     } else if near(band.middle) {
         Some(TiltHandle::Middle)
@@ -154,18 +154,18 @@ pub fn handle_at(tilt: &Tilt, place: &Place, at: Pos2) -> Option<TiltHandle> {
 }
 
 /// Drags a mark to `at`.
-pub fn drag_handle(tilt: &mut Tilt, handle: TiltHandle, place: &Place, at: Pos2) {
-    let band = Band::new(tilt, place);
+pub fn drag_handle(tilt: &mut Tilt, handle: TiltHandle, viewport: &Viewport, at: Pos2) {
+    let band = TiltBand::new(tilt, viewport);
     let from_middle = at - band.middle;
     match handle {
-        TiltHandle::Middle => tilt.center_y = ((at.y - place.rect.top()) / place.rect.height()).clamp(0.0, 1.0),
+        TiltHandle::Middle => tilt.center_y = ((at.y - viewport.rect.top()) / viewport.rect.height()).clamp(0.0, 1.0),
         TiltHandle::Edge => {
             let across = from_middle.dot(band.across) / band.across.length_sq();
             tilt.band = (2.0 * across.abs()).clamp(0.0, 1.0);
         }
         // Closer to the centre, the angle would be unstable.
         TiltHandle::Turn if from_middle.length() > 4.0 => {
-            let side = if place.mirror { -1.0 } else { 1.0 };
+            let side = if viewport.mirror { -1.0 } else { 1.0 };
             let angle = from_middle.y.atan2(side * from_middle.x).to_degrees();
             // Snaps to multiples of 45 degrees.
             let nearest = (angle / 45.0).round() * 45.0;
@@ -177,7 +177,7 @@ pub fn drag_handle(tilt: &mut Tilt, handle: TiltHandle, place: &Place, at: Pos2)
 
 /// Returns the `center_y` that makes the band's centre line pass through a point, given as fractions of the picture;
 /// `size` is the picture's size in pixels.
-pub fn center_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
+pub fn center_y_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
     let (sin, cos) = tilt.angle_deg.to_radians().sin_cos();
     if cos.abs() < 0.2 {
         // Nearly vertical band: `center_y` would lie far outside the picture.
@@ -187,17 +187,17 @@ pub fn center_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
 }
 
 /// Draws the tilt-shift band and its marks; the mark `near` the pointer is enlarged.
-pub fn draw_tilt(painter: &Painter, tilt: &Tilt, place: &Place, near: Option<TiltHandle>) {
-    let band = Band::new(tilt, place);
+pub fn draw_tilt(painter: &Painter, tilt: &Tilt, viewport: &Viewport, near: Option<TiltHandle>) {
+    let band = TiltBand::new(tilt, viewport);
     // Extends by the picture's diagonal in each direction, so that the edges cross the whole picture.
-    let extent = band.along * (place.rect.size().length() / place.rect.height());
+    let extent = band.along * (viewport.rect.size().length() / viewport.rect.height());
     for side in [-1.0, 1.0] {
         let at = band.edge(tilt, side);
-        for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+        for (width, color) in [(3.5, OVERLAY_OUTLINE), (1.5, OVERLAY_COLOR)] {
             painter.extend(Shape::dashed_line(&[at - extent, at + extent], Stroke::new(width, color), 10.0, 7.0));
         }
     }
-    let rotation_handle = band.rotation_handle(place);
+    let rotation_handle = band.rotation_handle(viewport);
     draw_line(painter, [band.middle, rotation_handle], 1.5);
     let size = |handle: TiltHandle, usual: f32| if near == Some(handle) { usual + 2.5 } else { usual };
     for side in [-1.0, 1.0] {

@@ -12,8 +12,6 @@ mod instruments;
 mod legend;
 mod marks;
 mod notes;
-mod parts;
-mod place;
 mod plate;
 mod probe;
 mod sections;
@@ -23,10 +21,12 @@ mod tests;
 mod theme;
 mod timer;
 mod transport;
+mod viewport;
+mod widgets;
 
-pub use dock::room_px;
+pub use dock::picture_area_px;
 pub use fonts::SystemFonts;
-pub use theme::install as dress;
+pub use theme::install as install_theme;
 
 use std::time::Duration;
 
@@ -37,12 +37,12 @@ use super::state::{Action, State};
 use super::{keys, meters, state, views};
 use canvas::Gestures;
 use dock::Dock;
-use place::Place;
+use viewport::Viewport;
 
 /// Seconds without pointer or keyboard input after which the panel hides in full screen.
 const HIDE_DELAY_S: f64 = 4.0;
 /// Minimum size of the window in points; the text scale is limited to preserve it.
-const MIN_SIZE: Vec2 = Vec2::new(320.0, 200.0);
+const MIN_LAYOUT_SIZE: Vec2 = Vec2::new(320.0, 200.0);
 /// Shown if the chosen text scale exceeds that limit.
 const TEXT_TOO_LARGE: &str = "The window is too small for text of this size: the text is as large as fits.";
 /// Seconds after which a key or the wheel without further events counts as released.
@@ -52,34 +52,34 @@ const RELEASE_DELAY_S: f64 = 0.8;
 #[derive(Default)]
 pub struct Panel {
     /// Whether the panel never hides, because screen readers could not find it again.
-    pub stays: bool,
+    pub is_always_visible: bool,
     /// Whether fonts and styles are installed.
-    ready: bool,
+    has_theme: bool,
     /// Time of the last pointer or keyboard input, in egui's seconds.
     active_s: f64,
     /// Time of the last pointer movement or press, in egui's seconds.
     pointer_used_s: f64,
     /// Whether the current touch only reopened the panel, and has no other effect.
-    waking: bool,
+    is_wake_touch: bool,
     /// Time of the last look change by a control that is still held, in egui's seconds.
     stroke_s: Option<f64>,
     gestures: Gestures,
-    sheet: sheet::Memory,
-    instruments: instruments::Cache,
+    sheet: sheet::PanelState,
+    instruments: instruments::Instruments,
     notes: notes::NoteTimes,
     badges: badges::Badges,
     /// The control that had the focus before a modal covered the window.
-    focused: Option<Id>,
+    last_focused: Option<Id>,
     /// Whether a modal covers the window.
     covered: bool,
-    timer: timer::Timer,
-    transport: transport::Bar,
+    timer: timer::SelfTimer,
+    transport: transport::TransportBar,
     /// Position to probe for depth and blur, as fractions of the picture.
     pub probed: Option<[f32; 2]>,
     /// Whether the window is too small for the chosen text scale.
-    cramped: bool,
+    is_text_limited: bool,
     /// Whether a control had the focus or a popup was open at the end of the last pass.
-    was_in_hand: bool,
+    was_in_use: bool,
 }
 
 /// The picture's area in the window.
@@ -97,27 +97,27 @@ impl Panel {
     /// Draws the controls, handles keys and gestures, and appends the resulting actions.
     pub fn show(&mut self, ui: &mut Ui, state: &State, canvas: Canvas, actions: &mut Vec<Action>) {
         let ctx = ui.ctx().clone();
-        if !std::mem::replace(&mut self.ready, true) {
+        if !std::mem::replace(&mut self.has_theme, true) {
             theme::install(&ctx);
             self.active_s = ctx.input(|input| input.time);
         }
         ctx.accesskit_node_builder(egui::accesskit_root_id(), |node| node.set_label("bokehcam"));
         let first = actions.len();
-        self.set_text_scale(&ctx, state.habits.text_scale, actions);
+        self.set_text_scale(&ctx, state.preferences.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
-        let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
+        let viewport = Viewport::new(canvas, ctx.pixels_per_point(), state.mirror);
         let window = ctx.content_rect();
-        let awake = self.is_awake(ui, state.panel && !state.bare, place.is_none());
-        let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
-        let is_shown = !state.bare && state.panel && (in_use || !state.full_screen);
-        let dock = is_shown.then(|| Dock::of(window, size, state.shows_more()));
+        let awake = self.is_awake(ui, state.panel && !state.controls_hidden, viewport.is_none());
+        let in_use = awake || self.is_always_visible || self.sheet.is_in_use(&ctx);
+        let is_shown = !state.controls_hidden && state.panel && (in_use || !state.full_screen);
+        let dock = is_shown.then(|| Dock::new(window, size, state.is_expanded()));
         // Must precede keys and gestures: their zoom steps depend on the current layout.
-        dock::set_room(&ctx, dock.map_or(window, |dock| dock.room));
+        dock::set_picture_area(&ctx, dock.map_or(window, |dock| dock.picture_area));
         self.read_keys(ui, state, size, actions);
         self.probed = None;
-        if let Some(place) = place {
-            self.gestures.show(ui, state, place, self.waking, actions);
-            self.probed = probe::probed_point(ui, state, &place);
+        if let Some(viewport) = viewport {
+            self.gestures.show(ui, state, viewport, self.is_wake_touch, actions);
+            self.probed = probe::probed_point(ui, state, &viewport);
         }
         if state.full_screen && self.is_pointer_idle(ui) {
             ctx.set_cursor_icon(egui::CursorIcon::None);
@@ -127,7 +127,7 @@ impl Panel {
         }
         let mut bottom = 0.0;
         self.sheet.show(&ctx, state, dock, size, actions);
-        if !state.bare {
+        if !state.controls_hidden {
             if awake && !state.panel {
                 sheet::show_reopen_button(&ctx, actions);
             }
@@ -146,9 +146,9 @@ impl Panel {
             help::show(&ctx, state, actions);
         }
         self.restore_focus(&ctx, state.help || state.closing);
-        theme::focus_ring(&ctx);
-        actions.extend(parts::take_message(&ctx).map(Action::Note));
-        self.was_in_hand = ctx.memory(|memory| memory.focused().is_some()) || egui::Popup::is_any_open(&ctx);
+        theme::draw_focus_ring(&ctx);
+        actions.extend(widgets::take_message(&ctx).map(Action::Note));
+        self.was_in_use = ctx.memory(|memory| memory.focused().is_some()) || egui::Popup::is_any_open(&ctx);
         self.end_stroke(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
     }
 
@@ -156,8 +156,8 @@ impl Panel {
     /// new scale in the next pass.
     fn set_text_scale(&mut self, ctx: &Context, chosen: f32, actions: &mut Vec<Action>) {
         let window = ctx.content_rect().size() * ctx.zoom_factor();
-        let max_scale = (window.x / MIN_SIZE.x).min(window.y / MIN_SIZE.y).max(1.0);
-        if !std::mem::replace(&mut self.cramped, chosen > max_scale) && self.cramped {
+        let max_scale = (window.x / MIN_LAYOUT_SIZE.x).min(window.y / MIN_LAYOUT_SIZE.y).max(1.0);
+        if !std::mem::replace(&mut self.is_text_limited, chosen > max_scale) && self.is_text_limited {
             actions.push(Action::Note(TEXT_TOO_LARGE.to_owned()));
         }
         if (ctx.zoom_factor() - chosen.min(max_scale)).abs() > 1e-3 {
@@ -168,8 +168,10 @@ impl Panel {
     /// Restores the focus once no modal covers the window any more.
     fn restore_focus(&mut self, ctx: &Context, covered: bool) {
         match (std::mem::replace(&mut self.covered, covered), covered) {
-            (true, false) => self.focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id))),
-            (false, false) => self.focused = ctx.memory(|memory| memory.focused()),
+            (true, false) => {
+                self.last_focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id)))
+            }
+            (false, false) => self.last_focused = ctx.memory(|memory| memory.focused()),
             (_, true) => {}
         }
     }
@@ -182,12 +184,13 @@ impl Panel {
         }
         // egui or a question has already handled Esc (dropped the focus, closed a popup): it must not close anything
         // else.
-        let is_used = self.was_in_hand || self.sheet.is_asking() && !state.help && !state.closing;
+        let is_used = self.was_in_use || self.sheet.has_open_dialog() && !state.help && !state.closing;
         let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && is_used;
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
-        let context = keys::Context { size, fit: place::fit_scale(ctx, size), chord: 0 };
+        let context = keys::Context { size, fit: viewport::fit_scale(ctx, size), chord: 0 };
         ui.input(|input| {
-            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, context, focused)));
+            actions
+                .extend(input.events.iter().filter_map(|event| keys::action_for_event(event, state, context, focused)));
         });
     }
 
@@ -204,7 +207,7 @@ impl Panel {
             (input.time, active, input.events.iter().any(began))
         });
         if touched {
-            self.waking = has_panel && now_s - self.active_s > HIDE_DELAY_S && !self.sheet.is_in_use(ui.ctx());
+            self.is_wake_touch = has_panel && now_s - self.active_s > HIDE_DELAY_S && !self.sheet.is_in_use(ui.ctx());
         }
         // The first countdown starts with the first picture.
         if active || is_waiting {
@@ -235,7 +238,7 @@ impl Panel {
         let changed_s = self.stroke_s?;
         if released || !down && now_s - changed_s > RELEASE_DELAY_S {
             self.stroke_s = None;
-            return Some(Action::Settle);
+            return Some(Action::EndStroke);
         }
         None
     }

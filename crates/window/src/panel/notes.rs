@@ -4,16 +4,16 @@ use std::time::Duration;
 
 use egui::{Context, Id};
 
-use super::cards::Stack;
+use super::cards::CardStack;
 use super::plate;
 use super::state::{Action, Source, State};
 use super::theme::GAP;
-use super::timer::Timer;
+use super::timer::SelfTimer;
 use crate::texts::tr_with;
 
 /// Time a note is shown, plus reading time per character, in seconds.
 const SHOWN_S: f64 = 3.5;
-const PER_LETTER_S: f64 = 0.05;
+const PER_CHARACTER_S: f64 = 0.05;
 /// Fade-out at the end of that time, in seconds.
 const FADE_S: f64 = 0.4;
 /// Maximum number of notes shown at once.
@@ -37,22 +37,22 @@ impl NoteTimes {
         &mut self,
         ctx: &Context,
         state: &State,
-        (bottom, timer): (f32, &mut Timer),
+        (bottom, timer): (f32, &mut SelfTimer),
         actions: &mut Vec<Action>,
     ) {
-        let mut stack = Stack { ctx, bottom: bottom + GAP };
+        let mut stack = CardStack { ctx, bottom: bottom + GAP };
         timer.show(&mut stack, state, actions);
         plate::show(&mut stack, state, actions);
-        if state.is_demonstration() && !state.bare && !state.knows_demonstration {
-            let buttons = [("OK", "Esc", Action::KnowDemonstration)];
+        if state.is_demonstration() && !state.controls_hidden && !state.demonstration_dismissed {
+            let buttons = [("OK", "Esc", Action::DismissDemonstration)];
             stack.add_buttons("demonstration", 460.0, DEMONSTRATION, buttons, actions);
         }
         add_banner(&mut stack, state, actions);
-        if let Some(why) = &state.trouble {
+        if let Some(why) = &state.output_failure {
             let [title, why] = failure_texts(why);
-            stack.add_buttons("trouble", 460.0, [title, why], [("OK", "Esc", Action::Dismiss)], actions);
+            stack.add_buttons("trouble", 460.0, [title, why], [("OK", "Esc", Action::DismissFailure)], actions);
         }
-        plate::offer(&mut stack, state, actions);
+        plate::show_offer(&mut stack, state, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {
@@ -67,7 +67,7 @@ impl NoteTimes {
             .iter()
             .filter_map(|note| {
                 let first_s = self.seen.iter().find(|(number, _)| *number == note.number)?.1;
-                let left_s = first_s + SHOWN_S + PER_LETTER_S * note.text.chars().count() as f64 - now_s;
+                let left_s = first_s + SHOWN_S + PER_CHARACTER_S * note.text.chars().count() as f64 - now_s;
                 if left_s <= 0.0 {
                     return None;
                 }
@@ -93,7 +93,7 @@ fn failure_texts(why: &str) -> [&str; 2] {
 
 /// Draws the reason why the source delivers no frames with a retry button, at the bottom so as not to cover the
 /// picture's middle.
-fn add_banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+fn add_banner(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
     let silent;
     let (title, why, button) = match (&state.source, state.silent_s) {
         (Source::Running(_), None) => return,

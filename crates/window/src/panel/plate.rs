@@ -2,34 +2,34 @@
 
 use egui::{ProgressBar, RichText};
 
-use super::cards::{Stack, paragraph};
-use super::dock::room;
-use super::parts::button;
+use super::cards::{CardStack, add_paragraph};
+use super::dock::picture_area;
 use super::state::{Action, State};
-use super::theme::medium;
+use super::theme::medium_font;
+use super::widgets::add_button;
 use crate::texts::tr;
 use bokehcam::depth::plate::Step;
 
 const WIDTH: f32 = 420.0;
 
 /// Draws the offer of depth methods, if the source has no depth.
-pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
-    if !state.offers_depth() || state.bare {
+pub fn show_offer(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
+    if !state.offers_depth_methods() || state.controls_hidden {
         return;
     }
-    let network = ("Find me with a small network", "It separates a person from the background", Action::FindMe);
+    let network = ("Find me with a small network", "It separates a person from the background", Action::SegmentPerson);
     let plate =
-        ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::TakePlate);
+        ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::CapturePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());
-    let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclinePlate)]);
+    let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclineDepthOffer)]);
     // Omits the explanation if it would cover a small picture.
-    let is_small = room(stack.ctx).height() < 360.0;
+    let is_small = picture_area(stack.ctx).height() < 360.0;
     let why = if is_small { "" } else { "Nothing is known about depth here, so everything is blurred." };
     stack.add_buttons("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 
 /// Draws the instructions for the current step of the capture.
-pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+pub fn show(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
     let Some(step) = state.plate.filter(|step| *step != Step::Ready) else { return };
     let (title, why) = match step {
         Step::StepOut(_) => ("Step out of the picture", ""),
@@ -46,22 +46,23 @@ pub fn show(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
         ),
     };
     stack.add_card("plate", WIDTH, |ui, colors| {
-        ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
+        ui.label(RichText::new(tr(title)).family(medium_font()).size(22.0));
         match step {
             Step::StepOut(seconds) => {
-                ui.label(RichText::new(seconds.to_string()).family(medium()).size(40.0));
+                ui.label(RichText::new(seconds.to_string()).family(medium_font()).size(40.0));
             }
             Step::Capturing(percent) => {
                 ui.add(ProgressBar::new(percent as f32 / 100.0).desired_width(ui.available_width().min(WIDTH / 2.0)));
             }
             _ => {}
         }
-        paragraph(ui, colors, why);
-        if step == Step::Mismatched && button(ui, "Take another plate", "T") {
-            actions.push(Action::TakePlate);
+        add_paragraph(ui, colors, why);
+        if step == Step::Mismatched && add_button(ui, "Take another plate", "T") {
+            actions.push(Action::CapturePlate);
         }
-        if let Some(way) = state.way_without_plate().filter(|_| button(ui, "Find me without it", "Esc")) {
-            actions.push(Action::DepthBy(way));
+        if let Some(depth_method) = state.method_without_plate().filter(|_| add_button(ui, "Find me without it", "Esc"))
+        {
+            actions.push(Action::SetDepthMethod(depth_method));
         }
     });
 }

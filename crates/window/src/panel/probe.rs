@@ -3,8 +3,8 @@
 use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 
 use super::marks::draw_label;
-use super::place::Place;
 use super::state::{Shown, State};
+use super::viewport::Viewport;
 use crate::texts::{tr, tr_with};
 use crate::views::Probe;
 use bokehcam::frame::DepthMap;
@@ -14,13 +14,13 @@ const PERIOD_S: f32 = 0.2;
 
 /// Returns the probed position as fractions of the picture. The probe is active while the instruments or a diagnostic
 /// view are shown, or Alt is held.
-pub fn probed_point(ui: &Ui, state: &State, place: &Place) -> Option<[f32; 2]> {
+pub fn probed_point(ui: &Ui, state: &State, viewport: &Viewport) -> Option<[f32; 2]> {
     let (at, alt) = ui.input(|input| (input.pointer.hover_pos(), input.modifiers.alt));
-    let is_wanted = alt || !state.bare && (state.instruments || state.shown != Shown::Picture);
-    let at = at.filter(|at| is_wanted && place.visible.contains(*at))?;
+    let is_wanted = alt || !state.controls_hidden && (state.instruments || state.shown != Shown::Picture);
+    let at = at.filter(|at| is_wanted && viewport.visible.contains(*at))?;
     // Not through the panel.
     let layer = ui.ctx().layer_id_at(at);
-    (layer.is_none() || layer == Some(ui.layer_id())).then(|| place.to_fractions(at))
+    (layer.is_none() || layer == Some(ui.layer_id())).then(|| viewport.to_fractions(at))
 }
 
 /// Draws the probe's values beside the pointer.
@@ -30,7 +30,7 @@ pub fn show(ctx: &Context, state: &State) {
     let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("probe")));
     let text = format_probe(probe, state.camera.is_relative);
     // At the lower right of the pointer, unless that would be outside the window.
-    let window = super::dock::room(ctx);
+    let window = super::dock::picture_area(ctx);
     let (x, dx) = if at.x + 240.0 < window.right() { (Align::Min, 16.0) } else { (Align::Max, -12.0) };
     let (y, dy) = if at.y + 50.0 < window.bottom() { (Align::Min, 20.0) } else { (Align::Max, -12.0) };
     draw_label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);

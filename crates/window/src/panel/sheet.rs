@@ -5,28 +5,28 @@ use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 use super::cards;
 use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
-use super::parts::truncate_start;
-use super::sections::{self, Editing, Sheet, Thumbnails, first};
+use super::sections::{self, PresetEditor, Sheet, Thumbnails, first};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD};
+use super::widgets::truncate_start;
 use crate::texts::{tr, tr_with};
 
 /// State of the panel between frames.
 #[derive(Default)]
-pub struct Memory {
-    editing: Editing,
+pub struct PanelState {
+    editing: PresetEditor,
     thumbnails: Thumbnails,
     /// Rectangle at the last drawing; `None` while it is closed.
     rect: Option<Rect>,
     /// The control that had the focus in the previous pass.
-    focused: Option<Id>,
+    last_focused: Option<Id>,
 }
 
-fn id() -> Id {
+fn panel_id() -> Id {
     Id::unique("panel")
 }
 
-impl Memory {
+impl PanelState {
     /// Whether the panel must not hide: the pointer is over it, a control has the focus, or a popup is open.
     pub fn is_in_use(&self, ctx: &Context) -> bool {
         let pointer = ctx.input(|input| input.pointer.latest_pos());
@@ -35,8 +35,8 @@ impl Memory {
     }
 
     /// Whether a dialog is open that Esc cancels.
-    pub fn is_asking(&self) -> bool {
-        self.rect.is_some() && self.editing.is_asking()
+    pub fn has_open_dialog(&self) -> bool {
+        self.rect.is_some() && self.editing.has_open_dialog()
     }
 
     /// Returns its rectangle at the last drawing, if it is open.
@@ -55,25 +55,25 @@ impl Memory {
     ) {
         self.rect = dock.map(|dock| dock.panel);
         let Some(Dock { panel, columns, .. }) = dock else { return };
-        let area = Area::new(id()).fixed_pos(panel.min).order(Order::Middle).constrain(false).fade_in(false);
+        let area = Area::new(panel_id()).fixed_pos(panel.min).order(Order::Middle).constrain(false).fade_in(false);
         let drawn = area.show(ctx, |ui| {
-            let colors = Colors::here(ui);
+            let colors = Colors::for_ui(ui);
             ui.set_max_size(panel.size().max(Vec2::splat(1.0)));
-            theme::card(&colors).show(ui, |ui| {
+            theme::card_frame(&colors).show(ui, |ui| {
                 let inner = (panel.size() - Vec2::splat(2.0 * (PAD + LINE))).max(Vec2::splat(1.0));
                 ui.set_width(inner.x);
-                let more = state.shows_more();
+                let more = state.is_expanded();
                 let scroll = ScrollArea::vertical().max_height(inner.y.max(20.0)).auto_shrink([false, true]);
                 scroll.show(ui, |ui| {
                     let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
                     first::show(ui, &mut sheet, columns);
                     if more {
-                        header(ui, state, sheet.actions);
-                        status(ui, state);
+                        add_header(ui, state, sheet.actions);
+                        add_status(ui, state);
                         ui.spacing_mut().combo_width = ui.available_width();
                         sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbnails);
                     }
-                    self.follow_focus(ui);
+                    self.scroll_to_focus(ui);
                     let Sheet { look, stroke, .. } = sheet;
                     if stroke.is_some() && look != state.look {
                         actions.push(Action::Look { look: Box::new(look), stroke });
@@ -82,32 +82,32 @@ impl Memory {
             });
         });
         // The status line changes without any input.
-        if matches!(state.source, Source::Running(_)) && state.shows_more() && !state.stands_still() {
+        if matches!(state.source, Source::Running(_)) && state.is_expanded() && !state.can_pause_pipeline() {
             ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
         self.rect = Some(drawn.response.rect);
     }
 
     /// Scrolls to a newly focused control that is out of sight.
-    fn follow_focus(&mut self, ui: &Ui) {
+    fn scroll_to_focus(&mut self, ui: &Ui) {
         let focused = ui.ctx().memory(|memory| memory.focused());
-        if let Some(id) = focused.filter(|_| focused != self.focused)
+        if let Some(id) = focused.filter(|_| focused != self.last_focused)
             && let Some(response) = ui.ctx().read_response(id)
             && response.layer_id == ui.layer_id()
             && !ui.clip_rect().contains_rect(response.rect)
         {
             ui.scroll_to_rect(response.rect.expand(8.0), None);
         }
-        self.focused = focused;
+        self.last_focused = focused;
     }
 }
 
 /// Draws a button that reopens the panel, at the panel's corner.
 pub fn show_reopen_button(ctx: &Context, actions: &mut Vec<Action>) {
-    let corner = ctx.content_rect().right_top() + vec2(-GAP - icons::SIDE - 6.0, GAP);
-    let area = Area::new(id().with("way back")).fixed_pos(corner).order(Order::Middle);
+    let corner = ctx.content_rect().right_top() + vec2(-GAP - icons::ICON_SIZE - 6.0, GAP);
+    let area = Area::new(panel_id().with("way back")).fixed_pos(corner).order(Order::Middle);
     cards::show(ctx, area, 60.0, 3, |ui, _| {
-        if icons::button(ui, Icon::Panel, "Show the panel (P)", true) {
+        if icons::add_button(ui, Icon::Panel, "Show the panel (P)", true) {
             actions.push(Action::Panel(true));
         }
     });
@@ -117,14 +117,14 @@ pub fn show_reopen_button(ctx: &Context, actions: &mut Vec<Action>) {
 const STATUS_PERIOD_S: f32 = 0.5;
 
 /// Adds a line with the source's status and the focus distance.
-fn status(ui: &mut Ui, state: &State) {
-    let colors = Colors::here(ui);
+fn add_status(ui: &mut Ui, state: &State) {
+    let colors = Colors::for_ui(ui);
     let mut parts: Vec<String> = Vec::new();
     if let Source::Running(running) = &state.source {
         // Shortened, to leave room for the focus distance.
         parts.push(truncate_start(&running.label, 34));
     }
-    let focused = state.look.effect.follows_depth() && !state.known().is_relative;
+    let focused = state.look.effect.follows_depth() && !state.source_depth().is_relative;
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
         parts.push(tr_with("focused at {} m", &[&format!("{metres:.2}")]));
     }
@@ -139,7 +139,7 @@ fn status(ui: &mut Ui, state: &State) {
 }
 
 /// Adds the buttons for undo, redo, reset, help and hiding the panel.
-fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn add_header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         let (undo, redo) = state.history.can_undo_redo();
@@ -151,7 +151,7 @@ fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
         ];
         for (icon, hint, enabled, action) in buttons {
-            if icons::button(ui, icon, hint, enabled) {
+            if icons::add_button(ui, icon, hint, enabled) {
                 actions.push(action);
             }
         }

@@ -65,12 +65,12 @@ const LIGHT: Colors = Colors {
 };
 
 /// Marks on the picture, in both themes: light lines with a dark border stand out on any picture.
-pub const ON_PICTURE: Color32 = Color32::from_rgb(255, 255, 255);
-pub const SHADE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
+pub const OVERLAY_COLOR: Color32 = Color32::from_rgb(255, 255, 255);
+pub const OVERLAY_OUTLINE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
 
 impl Colors {
     /// Returns the colours of a theme.
-    pub fn of(theme: Theme) -> Self {
+    pub fn for_theme(theme: Theme) -> Self {
         match theme {
             Theme::Dark => DARK,
             Theme::Light => LIGHT,
@@ -87,7 +87,7 @@ impl Colors {
     }
 
     /// Returns the text colour for that background; dimmed if it cannot be selected.
-    pub fn on_fill(&self, chosen: bool, possible: bool) -> Color32 {
+    pub fn text_on_fill(&self, chosen: bool, possible: bool) -> Color32 {
         match (chosen, possible) {
             (true, _) => self.on_accent,
             (false, true) => self.text,
@@ -96,8 +96,8 @@ impl Colors {
     }
 
     /// Returns the colours of the active theme.
-    pub fn here(ui: &egui::Ui) -> Self {
-        Self::of(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
+    pub fn for_ui(ui: &egui::Ui) -> Self {
+        Self::for_theme(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
     }
 }
 
@@ -118,22 +118,22 @@ pub fn quality_color(quality: Option<Quality>, theme: Theme) -> (Color32, &'stat
 }
 
 /// Returns the font family of headings and selected controls.
-pub fn medium() -> FontFamily {
+pub fn medium_font() -> FontFamily {
     FontFamily::Name("medium".into())
 }
 
 /// Installs fonts and styles; call once, before the first pass that draws.
 pub fn install(ctx: &Context) {
-    ctx.set_fonts(fonts());
+    ctx.set_fonts(font_definitions());
     for theme in [Theme::Dark, Theme::Light] {
-        ctx.set_style_of(theme, style(theme));
+        ctx.set_style_of(theme, create_style(theme));
     }
     // The key bindings change the text scale instead.
     ctx.options_mut(|options| options.zoom_with_keyboard = false);
 }
 
 /// Returns the two bundled fonts, replacing egui's.
-fn fonts() -> FontDefinitions {
+fn font_definitions() -> FontDefinitions {
     let mut fonts = FontDefinitions::empty();
     let files: [(&str, &[u8]); 2] = [
         ("regular", include_bytes!("../fonts/Roboto-Regular.ttf")),
@@ -143,7 +143,7 @@ fn fonts() -> FontDefinitions {
         fonts.font_data.insert(name.to_owned(), Arc::new(FontData::from_static(file)));
     }
     for (family, name) in
-        [(FontFamily::Proportional, "regular"), (FontFamily::Monospace, "regular"), (medium(), "medium")]
+        [(FontFamily::Proportional, "regular"), (FontFamily::Monospace, "regular"), (medium_font(), "medium")]
     {
         fonts.families.insert(family, vec![name.to_owned()]);
     }
@@ -151,11 +151,11 @@ fn fonts() -> FontDefinitions {
 }
 
 /// Returns text sizes and spacing.
-fn style(theme: Theme) -> Style {
-    let colors = Colors::of(theme);
-    let mut style = Style { visuals: visuals(theme, &colors), animation_time: 0.12, ..Style::default() };
+fn create_style(theme: Theme) -> Style {
+    let colors = Colors::for_theme(theme);
+    let mut style = Style { visuals: create_visuals(theme, &colors), animation_time: 0.12, ..Style::default() };
     style.text_styles = [
-        (TextStyle::Heading, FontId::new(16.0, medium())),
+        (TextStyle::Heading, FontId::new(16.0, medium_font())),
         (TextStyle::Body, FontId::new(13.5, FontFamily::Proportional)),
         (TextStyle::Button, FontId::new(13.0, FontFamily::Proportional)),
         (TextStyle::Small, FontId::new(12.0, FontFamily::Proportional)),
@@ -183,7 +183,7 @@ fn style(theme: Theme) -> Style {
 }
 
 /// Returns colours and shapes of egui's own widgets.
-fn visuals(theme: Theme, colors: &Colors) -> Visuals {
+fn create_visuals(theme: Theme, colors: &Colors) -> Visuals {
     let mut visuals = if theme == Theme::Dark { Visuals::dark() } else { Visuals::light() };
     let radius = CornerRadius::same(7);
     let widget = |fill: Color32, border: Stroke, text: Color32| WidgetVisuals {
@@ -207,7 +207,7 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     visuals.extreme_bg_color = colors.field;
     visuals.faint_bg_color = colors.field;
     visuals.panel_fill = colors.card;
-    visuals.window_fill = opaque(colors.card);
+    visuals.window_fill = to_opaque(colors.card);
     visuals.window_stroke = Stroke::new(1.0, colors.line);
     visuals.window_corner_radius = CornerRadius::same(12);
     visuals.menu_corner_radius = CornerRadius::same(9);
@@ -220,13 +220,13 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
 }
 
 /// Returns the same colour, fully opaque.
-pub fn opaque(color: Color32) -> Color32 {
+pub fn to_opaque(color: Color32) -> Color32 {
     let [r, g, b, _] = color.to_srgba_unmultiplied();
     Color32::from_rgb(r, g, b)
 }
 
 /// Returns the frame of panel and cards.
-pub fn card(colors: &Colors) -> egui::Frame {
+pub fn card_frame(colors: &Colors) -> egui::Frame {
     egui::Frame::new()
         .fill(colors.card)
         .stroke(Stroke::new(1.0, colors.line))
@@ -235,10 +235,10 @@ pub fn card(colors: &Colors) -> egui::Frame {
 }
 
 /// Draws a ring around the visible part of the control that has the keyboard focus.
-pub fn focus_ring(ctx: &Context) {
+pub fn draw_focus_ring(ctx: &Context) {
     let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
     if let Some(response) = focused.filter(|response| response.sense.interactive()) {
-        let colors = Colors::of(ctx.theme());
+        let colors = Colors::for_theme(ctx.theme());
         let seen = response.interact_rect.expand(3.0);
         let painter = ctx.layer_painter(response.layer_id).with_clip_rect(seen);
         painter.rect_stroke(

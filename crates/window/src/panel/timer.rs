@@ -2,22 +2,22 @@
 
 use egui::RichText;
 
-use super::cards::Stack;
+use super::cards::CardStack;
 use super::state::{Action, State};
-use super::theme::medium;
+use super::theme::medium_font;
 
 /// Delay of the snapshot, in seconds.
 const DELAY_S: f64 = 3.0;
 
 /// Due time of the snapshot, in egui's seconds.
 #[derive(Debug, Default)]
-pub struct Timer {
+pub struct SelfTimer {
     due_s: Option<f64>,
 }
 
-impl Timer {
+impl SelfTimer {
     /// Draws the remaining seconds, and triggers the snapshot at 0.
-    pub fn show(&mut self, stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
+    pub fn show(&mut self, stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
         let ctx = stack.ctx;
         let now_s = ctx.input(|input| input.time);
         self.due_s = state.self_timer.then(|| self.due_s.unwrap_or(now_s + DELAY_S));
@@ -29,7 +29,7 @@ impl Timer {
         }
         ctx.request_repaint_after_secs((left_s.fract() + 0.005) as f32);
         stack.add_card("self-timer", 200.0, |ui, _| {
-            ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(40.0));
+            ui.label(RichText::new(left_s.ceil().to_string()).family(medium_font()).size(40.0));
         });
     }
 }

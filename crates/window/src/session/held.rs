@@ -59,7 +59,7 @@ impl HeldBlur {
             let depth = made.depth.take().map(Depth::Final);
             (coc, made.depth) = still::compute_coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
         }
-        self.blur.set_look(&fixed, (size, false), |settings| services.executor(settings, size))?;
+        self.blur.set_look(&fixed, (size, false), |settings| services.create_executor(settings, size))?;
         if let Err(error) = self.blur.blur(&mut made, coc) {
             self.blur = Blur::default();
             return Err(plain(error));

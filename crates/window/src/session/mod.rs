@@ -2,8 +2,8 @@
 //! and stops outputs, without blocking the window.
 
 mod held;
-mod host;
-mod live;
+mod pipeline_run;
+mod worker;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -13,9 +13,9 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 pub use held::Still;
-use host::Host;
+use worker::SessionWorker;
 
-use super::services::{Services, Switch};
+use super::services::{CliOption, Services};
 use super::state::{Output, Request, Update};
 use bokehcam::capture::Seeker;
 use bokehcam::control::Answer;
@@ -26,7 +26,7 @@ use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
 use bokehcam::pipeline::{OutputRequest, PipelineError, View};
 use bokehcam::sink::ShutterControl;
-use bokehcam::sink::switch::Notice;
+use bokehcam::sink::tee_control::MemberEvent;
 use bokehcam::stats::Report;
 
 /// A slower close is logged.
@@ -36,7 +36,7 @@ const SLOW_CLOSE: Duration = Duration::from_secs(3);
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// Initial configuration of a session.
-pub struct Start {
+pub struct SessionConfig {
     /// Opens sources and outputs, and creates executors.
     pub services: Box<dyn Services>,
     pub look: Look,
@@ -59,7 +59,7 @@ pub struct Start {
     /// Whether outputs get the still card instead of the picture.
     pub off: Arc<AtomicBool>,
     /// Handle of the current run's outputs, to switch that.
-    pub release: CurrentShutter,
+    pub shutter: CurrentShutter,
 }
 
 /// The current run's switch that withholds pictures from the outputs. Set when a run begins; remote control locks it,
@@ -70,11 +70,11 @@ pub type CurrentShutter = Arc<Mutex<Option<ShutterControl>>>;
 pub enum SessionEvent {
     Update(Update),
     /// A new run: receiver of its frames, progress of its background plate, and seek handle if it is a recording.
-    Views(Receiver<View>, Option<Arc<Guide>>, Option<Arc<Seeker>>),
+    RunStarted(Receiver<View>, Option<Arc<Guide>>, Option<Arc<Seeker>>),
     /// Text for the clipboard.
     Copy(String),
     /// The held frame with a new look.
-    Blurred(Box<Still>),
+    Reblurred(Box<Still>),
 }
 
 /// Options of a save.
@@ -104,14 +104,14 @@ pub struct Closed {
 /// Commands to the session's thread.
 enum Command {
     Request(Request),
-    Save(Box<Still>, SaveOptions),
-    Hold(Box<Still>, bool),
-    ShutterControl,
-    Copy(Vec<Switch>),
+    SaveFrame(Box<Still>, SaveOptions),
+    HoldFrame(Box<Still>, bool),
+    ReleaseFrame,
+    CopyCommand(Vec<CliOption>),
     /// An event of an output of the run with this number.
-    OutputEvent(u64, Notice),
+    OutputEvent(u64, MemberEvent),
     /// The run with this number ended.
-    Ended(u64, Box<Result<Report, PipelineError>>),
+    RunEnded(u64, Box<Result<Report, PipelineError>>),
     Close,
 }
 
@@ -127,13 +127,13 @@ impl Session {
     ///
     /// # Errors
     /// Fails if the thread cannot be created.
-    pub fn begin(start: Start, wake: Wake) -> std::io::Result<Self> {
+    pub fn start(config: SessionConfig, wake: Wake) -> std::io::Result<Self> {
         let (commands, inbox) = mpsc::channel();
         let (sender, events) = mpsc::channel();
         let own_commands = commands.clone();
         let thread = thread::Builder::new()
             .name("session".into())
-            .spawn(move || Host::new(start, EventSender { sender, wake }, own_commands).run(&inbox))?;
+            .spawn(move || SessionWorker::new(config, EventSender { sender, wake }, own_commands).run(&inbox))?;
         Ok(Self { commands, events, thread })
     }
 
@@ -143,28 +143,28 @@ impl Session {
     }
 
     /// Sends a frame to be saved.
-    pub fn save(&self, still: Still, saving: SaveOptions) {
-        let _ = self.commands.send(Command::Save(Box::new(still), saving));
+    pub fn save_frame(&self, still: Still, saving: SaveOptions) {
+        let _ = self.commands.send(Command::SaveFrame(Box::new(still), saving));
     }
 
-    /// Holds a frame: it is blurred again with every new look until [`Self::let_go`]. With `is_behind` it is blurred
+    /// Holds a frame: it is blurred again with every new look until [`Self::release_frame`]. With `is_outdated` it is blurred
     /// immediately, because it does not have the latest look yet.
-    pub fn hold(&self, still: Still, is_behind: bool) {
-        let _ = self.commands.send(Command::Hold(Box::new(still), is_behind));
+    pub fn hold_frame(&self, still: Still, is_outdated: bool) {
+        let _ = self.commands.send(Command::HoldFrame(Box::new(still), is_outdated));
     }
 
     /// Releases the held frame.
-    pub fn let_go(&self) {
-        let _ = self.commands.send(Command::ShutterControl);
+    pub fn release_frame(&self) {
+        let _ = self.commands.send(Command::ReleaseFrame);
     }
 
-    /// Requests the equivalent command for the clipboard; `switches` are the window's options.
-    pub fn copy(&self, switches: Vec<Switch>) {
-        let _ = self.commands.send(Command::Copy(switches));
+    /// Requests the equivalent command for the clipboard; `cli_options` are the window's options.
+    pub fn copy_command(&self, cli_options: Vec<CliOption>) {
+        let _ = self.commands.send(Command::CopyCommand(cli_options));
     }
 
     /// Returns the next event without blocking.
-    pub fn hear(&self) -> Option<SessionEvent> {
+    pub fn try_recv_event(&self) -> Option<SessionEvent> {
         self.events.try_recv().ok()
     }
 
@@ -206,11 +206,11 @@ impl EventSender {
 
     /// Reports the folder of a saved file.
     fn report_saved(&self, file: &Path) {
-        folders::folder_of(file).into_iter().for_each(|folder| self.send_update(Update::Kept(folder)));
+        folders::folder_of(file).into_iter().for_each(|folder| self.send_update(Update::SavedIn(folder)));
     }
 
     /// Opens a folder in the file manager; reports failures as a note.
-    fn open(&self, folder: PathBuf) {
+    fn open_folder(&self, folder: PathBuf) {
         let events = self.clone();
         folders::open(folder, move |line| events.note(line));
     }

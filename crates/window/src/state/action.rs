@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Camera, DepthMethod, Output, Shown, Source};
-use crate::services::Browse;
+use crate::services::PathKind;
 use bokehcam::camera_control::CameraControl;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
@@ -20,7 +20,7 @@ pub enum Action {
         stroke: Option<&'static str>,
     },
     /// Ends the stroke: the control was released, and the next change starts a new undo step.
-    Settle,
+    EndStroke,
     /// Restores the previous look.
     Undo,
     Redo,
@@ -57,7 +57,7 @@ pub enum Action {
     /// Shows or hides the instruments.
     Instruments(bool),
     /// Shows only the picture, or everything again.
-    Bare(bool),
+    HideControls(bool),
     /// Shows or hides the help.
     Help(bool),
     /// Switches full screen.
@@ -84,7 +84,7 @@ pub enum Action {
     VirtualCamera(Option<String>),
     Open(String),
     /// Opens a file chooser for a source or a background picture.
-    Browse(Browse),
+    Browse(PathKind),
     /// Switches the camera's frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     /// Reopens the source.
@@ -92,15 +92,15 @@ pub enum Action {
     /// Sets a driver control of the camera.
     Control(String, i64),
     /// Captures a background plate: the user is told when to step out of the picture.
-    TakePlate,
+    CapturePlate,
     /// Gets depth from person segmentation.
-    FindMe,
+    SegmentPerson,
     /// Declines the offered depth methods.
-    DeclinePlate,
+    DeclineDepthOffer,
     /// Switches blur by depth on or off.
     Portrait(bool),
     /// Switches the depth method.
-    DepthBy(DepthMethod),
+    SetDepthMethod(DepthMethod),
     /// Refreshes the lists of sources and virtual cameras.
     Refresh,
     /// Copies the equivalent command to the clipboard.
@@ -108,11 +108,11 @@ pub enum Action {
     /// Closes the window, or opens the confirmation dialog.
     Close,
     /// Cancels closing.
-    StayOpen,
+    CancelClose,
     /// Dismisses the failure of an output.
-    Dismiss,
+    DismissFailure,
     /// Dismisses the notice about the demonstration.
-    KnowDemonstration,
+    DismissDemonstration,
     /// Switches whether snapshots include their inputs.
     KeepSources(bool),
 }
@@ -130,19 +130,19 @@ pub enum Request {
     /// Opens a folder in the file manager.
     OpenFolder(PathBuf),
     /// Starts an output. A recording without a name gets one.
-    Begin(Output),
-    End(Output),
+    StartOutput(Output),
+    StopOutput(Output),
     Open(String),
     /// Opens this source if it is valid.
     Offer(String),
-    Browse(Browse),
+    Browse(PathKind),
     /// Reopens the camera with this frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     Control(String, i64),
     /// Captures a background plate, and uses it for depth.
-    TakePlate,
+    CapturePlate,
     /// Switches the depth method.
-    DepthBy(DepthMethod),
+    SetDepthMethod(DepthMethod),
     /// Seeks to this frame of the recording.
     Seek(usize),
     /// Refreshes the lists of sources and virtual cameras.
@@ -173,15 +173,15 @@ pub enum Update {
     /// An offered source is valid, and is to be opened.
     Offered(String),
     /// The user chose another background.
-    Behind(Background),
+    Background(Background),
     /// Active outputs: sent after each start or stop, including failed ones.
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.
-    Recorded(u64),
+    RecordedBytes(u64),
     /// A file was saved in this folder.
-    Kept(PathBuf),
+    SavedIn(PathBuf),
     /// A message to the user.
     Note(String),
     /// Failure of an output: a message that stays until it is dismissed.
-    Trouble(String),
+    OutputFailure(String),
 }

@@ -10,9 +10,9 @@ pub const NO_DEPTH: &str = "Nothing is known about depth here: use a small netwo
 pub const NO_DEPTH_OF_PHOTO: &str =
     "This photo has no depth. Install a network (`bokehcam models get`), or put a depth map beside it: NAME-depth.png.";
 /// Shown instead if the command line declined the source's depth.
-pub const DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
+pub const DEPTH_DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
 /// Shown when the depth view is requested while depth is not computed.
-pub const NOT_FOLLOWED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
+pub const DEPTH_NOT_COMPUTED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
 /// Shown when a view of the blur's internals is requested without blur.
 pub const NOT_BLURRED: &str = "Nothing is blurred, so there is nothing to show here.";
 /// Shown when a background plate is requested but the source is not a camera.
@@ -31,7 +31,7 @@ impl State {
     pub fn apply(&mut self, action: Action) -> Vec<Request> {
         match action {
             Action::Look { look, stroke } => return self.set_look(*look, stroke),
-            Action::Settle => self.history.settle(),
+            Action::EndStroke => self.history.end_stroke(),
             Action::Undo => {
                 let before = self.history.undo(&self.look);
                 return self.replace_look(before);
@@ -41,7 +41,7 @@ impl State {
                 return self.replace_look(after);
             }
             Action::Reset => return self.set_look(self.first_look.clone(), None),
-            Action::Preset(name) => return self.set_preset(&name),
+            Action::Preset(name) => return self.apply_preset(&name),
             Action::SavePreset(name) => match name.trim() {
                 "" => self.note("A preset needs a name."),
                 name => {
@@ -52,29 +52,29 @@ impl State {
             Action::RenamePreset(name, new) => return vec![Request::RenamePreset(name, new)],
             Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
             // Views without data are refused, with a note that explains why.
-            Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth()),
-            Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
+            Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth_advice()),
+            Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(DEPTH_NOT_COMPUTED),
             Action::Show(Shown::Coc | Shown::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
-            Action::Freeze(on) => self.freeze(on),
+            Action::Freeze(on) => self.set_frozen(on),
             Action::Off(off) => {
                 self.off = off;
                 return vec![Request::Off(off)];
             }
             Action::Zoom(factor, at) => self.set_zoom(factor, at),
             Action::Pan(center) => self.zoom.center = center,
-            Action::Seek(place) => return self.seek(place),
-            Action::Step(by) => return self.step(by),
+            Action::Seek(frame) => return self.seek(frame),
+            Action::Step(by) => return self.step_frames(by),
             Action::Panel(on) => self.panel = on,
             Action::Instruments(on) => self.instruments = on,
-            Action::Bare(on) => self.bare = on,
+            Action::HideControls(on) => self.controls_hidden = on,
             Action::Help(on) => self.help = on,
-            Action::TextScale(scale) => self.habits.set_text_scale(scale),
-            Action::SingleKeys(on) => self.habits.single_keys = on,
-            Action::AskBeforeClosing(on) => self.habits.ask_before_closing = on,
-            Action::Section(name, open) => drop(self.habits.sections.insert(name.to_owned(), open)),
+            Action::TextScale(scale) => self.preferences.set_text_scale(scale),
+            Action::SingleKeys(on) => self.preferences.single_keys = on,
+            Action::AskBeforeClosing(on) => self.preferences.ask_before_closing = on,
+            Action::Section(name, open) => drop(self.preferences.sections.insert(name.to_owned(), open)),
             Action::Note(line) => self.note(line),
             Action::FullScreen(on) => {
                 self.full_screen = on;
@@ -82,43 +82,43 @@ impl State {
             }
             Action::Snapshot => return vec![Request::Snapshot],
             Action::SelfTimer(on) => self.self_timer = on,
-            Action::OpenFolder => return self.kept_in.clone().map(Request::OpenFolder).into_iter().collect(),
-            Action::Record(on) => return self.record(on),
+            Action::OpenFolder => return self.saved_in.clone().map(Request::OpenFolder).into_iter().collect(),
+            Action::Record(on) => return self.set_recording(on),
             Action::VirtualCamera(name) => return self.set_virtual_camera(name),
-            Action::Open(name) => return self.open(name),
+            Action::Open(name) => return self.open_source(name),
             Action::Browse(what) => return vec![Request::Browse(what)],
-            Action::Mode(size, fps) => return self.set_mode(size, fps),
-            Action::Retry => return self.open(self.source_name.clone()),
-            Action::Control(name, value) => return self.set_control(name, value),
-            Action::TakePlate if self.can_capture_plate() => {
-                self.declined_plate = false;
-                return vec![Request::TakePlate];
+            Action::Mode(size, fps) => return self.set_camera_mode(size, fps),
+            Action::Retry => return self.open_source(self.source_name.clone()),
+            Action::Control(name, value) => return self.set_camera_control(name, value),
+            Action::CapturePlate if self.can_capture_plate() => {
+                self.depth_offer_declined = false;
+                return vec![Request::CapturePlate];
             }
-            Action::TakePlate => self.note(NO_PLATE),
-            Action::DeclinePlate => self.declined_plate = true,
-            Action::FindMe => return vec![Request::DepthBy(DepthMethod::Person)],
-            Action::DepthBy(way) => return vec![Request::DepthBy(way)],
+            Action::CapturePlate => self.note(NO_PLATE),
+            Action::DeclineDepthOffer => self.depth_offer_declined = true,
+            Action::SegmentPerson => return vec![Request::SetDepthMethod(DepthMethod::Person)],
+            Action::SetDepthMethod(depth_method) => return vec![Request::SetDepthMethod(depth_method)],
             Action::Portrait(on) => return self.set_portrait(on),
             Action::Refresh => return vec![Request::Refresh],
             Action::CopyCommand => return vec![Request::CopyCommand],
-            Action::Close => return self.close(),
-            Action::StayOpen => self.closing = false,
-            Action::Dismiss => self.trouble = None,
-            Action::KnowDemonstration => self.knows_demonstration = true,
-            Action::KeepSources(on) => self.habits.keep_sources = on,
+            Action::Close => return self.request_close(),
+            Action::CancelClose => self.closing = false,
+            Action::DismissFailure => self.output_failure = None,
+            Action::DismissDemonstration => self.demonstration_dismissed = true,
+            Action::KeepSources(on) => self.preferences.keep_sources = on,
         }
         Vec::new()
     }
 
     /// Closes the window. The first call only opens the confirmation dialog if an output is active.
-    fn close(&mut self) -> Vec<Request> {
-        let asks = self.habits.ask_before_closing && !self.outputs.is_empty() && !self.closing;
+    fn request_close(&mut self) -> Vec<Request> {
+        let asks = self.preferences.ask_before_closing && !self.outputs.is_empty() && !self.closing;
         self.closing = asks;
         if asks { Vec::new() } else { vec![Request::Close] }
     }
 
     /// Freezes or unfreezes the picture, with a note that active outputs continue.
-    fn freeze(&mut self, on: bool) {
+    fn set_frozen(&mut self, on: bool) {
         if on && !self.frozen && !self.outputs.is_empty() {
             self.note(OUTPUTS_CONTINUE);
         }
@@ -126,9 +126,9 @@ impl State {
     }
 
     /// Returns advice for a source without depth.
-    pub fn no_depth(&self) -> &'static str {
-        match (self.is_photo(), self.declines_own_depth()) {
-            (_, true) => DECLINED,
+    pub fn no_depth_advice(&self) -> &'static str {
+        match (self.is_photo(), self.has_declined_depth()) {
+            (_, true) => DEPTH_DECLINED,
             (true, false) => NO_DEPTH_OF_PHOTO,
             (false, false) => NO_DEPTH,
         }
@@ -137,8 +137,8 @@ impl State {
     /// Switches blur by depth on or off. If there is no depth, offers the methods to get it.
     fn set_portrait(&mut self, on: bool) -> Vec<Request> {
         if on && !self.may_have_depth() {
-            self.declined_plate = false;
-            self.note(self.no_depth());
+            self.depth_offer_declined = false;
+            self.note(self.no_depth_advice());
             return Vec::new();
         }
         let effect = if on { Effect::Auto } else { Effect::None };
@@ -175,18 +175,18 @@ impl State {
         vec![Request::Look(Box::new(self.look.clone()))]
     }
 
-    fn set_preset(&mut self, name: &str) -> Vec<Request> {
+    fn apply_preset(&mut self, name: &str) -> Vec<Request> {
         let Some(preset) = self.presets.iter().find(|preset| preset.name == name) else {
             self.note(format!("There is no preset '{name}'."));
             return Vec::new();
         };
-        match self.patched(&preset.patch) {
+        match self.patch_look(&preset.patch) {
             Ok(look) => {
                 self.chosen_preset = Some(name.to_owned());
                 self.set_look(look, None)
             }
             Err(line) => {
-                let line = if line == self.no_depth() { line } else { format!("preset {name}: {line}") };
+                let line = if line == self.no_depth_advice() { line } else { format!("preset {name}: {line}") };
                 self.note(line);
                 Vec::new()
             }
@@ -197,9 +197,9 @@ impl State {
     ///
     /// # Errors
     /// Returns a one-line message if the patch needs depth that the source lacks, or its settings conflict.
-    pub fn patched(&self, patch: &Patch) -> Result<Look, String> {
+    pub fn patch_look(&self, patch: &Patch) -> Result<Look, String> {
         if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
-            return Err(self.no_depth().to_owned());
+            return Err(self.no_depth_advice().to_owned());
         }
         let look = patch.apply_to(&self.look).map_err(|error| error.to_string())?;
         let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
@@ -208,13 +208,13 @@ impl State {
             || is_lens(&look) && !is_lens(&self.look);
         // In a whole look, such as a preset, metric settings are dropped instead of rejected.
         let is_one_change = patch.effect.is_none();
-        match self.known().is_relative && look.effect.follows_depth() && is_one_change && asks {
+        match self.source_depth().is_relative && look.effect.follows_depth() && is_one_change && asks {
             true => Err(NO_METRES.to_owned()),
             false => Ok(look),
         }
     }
 
-    fn record(&mut self, on: bool) -> Vec<Request> {
+    fn set_recording(&mut self, on: bool) -> Vec<Request> {
         match (on, self.recording().cloned()) {
             (true, None) => self.start_output(Output { name: String::new(), is_camera: false }),
             (false, Some(output)) => self.stop_output(output),
@@ -240,27 +240,27 @@ impl State {
     /// Requests an output. It is listed immediately, so that it cannot start twice; the session reports the outcome.
     fn start_output(&mut self, output: Output) -> Vec<Request> {
         self.outputs.push(output.clone());
-        vec![Request::Begin(output)]
+        vec![Request::StartOutput(output)]
     }
 
     fn stop_output(&mut self, output: Output) -> Vec<Request> {
         self.outputs.retain(|other| *other != output);
-        vec![Request::End(output)]
+        vec![Request::StopOutput(output)]
     }
 
     /// Requests a source, and clears the state of the previous one.
-    pub(super) fn open(&mut self, name: String) -> Vec<Request> {
+    pub(super) fn open_source(&mut self, name: String) -> Vec<Request> {
         if name != self.source_name {
             self.controls.clear();
             self.source_name.clone_from(&name);
         }
         self.source = Source::Opening;
-        (self.frozen, self.settled, self.transport) = (false, false, None);
+        (self.frozen, self.shows_final_photo, self.transport) = (false, false, None);
         self.focus_m = None;
         vec![Request::Open(name)]
     }
 
-    fn set_control(&mut self, name: String, value: i64) -> Vec<Request> {
+    fn set_camera_control(&mut self, name: String, value: i64) -> Vec<Request> {
         let Some(control) = self.controls.iter_mut().find(|control| control.name == name && control.is_active) else {
             return Vec::new();
         };

@@ -24,7 +24,7 @@ impl State {
     }
 
     /// Requests another frame size and rate of the camera.
-    pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) -> Vec<Request> {
+    pub(super) fn set_camera_mode(&mut self, size: (u32, u32), fps: f64) -> Vec<Request> {
         self.source = Source::Opening;
         (self.frozen, self.focus_m) = (false, None);
         vec![Request::Mode(size, fps)]
@@ -37,7 +37,7 @@ mod tests {
     use crate::state::{Action, Update, sample};
 
     fn mirror_of(state: &State) -> Option<String> {
-        state.switches().into_iter().find(|(name, _)| name == "mirror").map(|(_, value)| value)
+        state.cli_options().into_iter().find(|(name, _)| name == "mirror").map(|(_, value)| value)
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub struct History {
 
 impl History {
     /// Pushes `look`, which is about to be replaced. Changes with the same stroke share one step until
-    /// [`History::settle`].
+    /// [`History::end_stroke`].
     pub fn push(&mut self, look: &Look, stroke: Option<&'static str>) {
         self.future.clear();
         if stroke.is_some() && stroke == self.stroke {
@@ -32,7 +32,7 @@ impl History {
     }
 
     /// Ends the stroke: the next change starts a new undo step.
-    pub fn settle(&mut self) {
+    pub fn end_stroke(&mut self) {
         self.stroke = None;
     }
 

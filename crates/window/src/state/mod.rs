@@ -4,20 +4,20 @@
 //! alone.
 
 mod action;
+mod adapt_look;
 mod apply;
 mod camera;
-mod fitting;
-mod habits;
-mod hear;
+mod cli_options;
+mod depth_method;
 mod history;
+mod preferences;
 #[cfg(test)]
 pub mod sample;
-mod switches;
 #[cfg(test)]
 mod tests;
 mod transport;
 pub mod tweak;
-mod way;
+mod updates;
 mod zoom;
 
 use std::path::PathBuf;
@@ -25,14 +25,14 @@ use std::path::PathBuf;
 pub use action::{Action, Request, Update};
 pub use apply::NO_VIRTUAL_CAMERA;
 pub use camera::Camera;
-pub use habits::{Habits, TEXT_SCALES};
+pub use depth_method::DepthMethod;
 pub use history::History;
+pub use preferences::{Preferences, TEXT_SCALE_RANGE};
 pub use transport::Transport;
-pub use way::DepthMethod;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
-use super::texts::translated;
+use super::texts::translate_sentence;
 pub use super::views::Shown;
 use super::views::{Legend, Probe};
 use bokehcam::camera_control::CameraControl;
@@ -77,8 +77,8 @@ pub struct Running {
     /// Origin of its depth.
     pub depth_from: DepthOrigin,
     /// Depth methods the source supports, and the active one.
-    pub ways: Vec<DepthMethod>,
-    pub way: Option<DepthMethod>,
+    pub depth_methods: Vec<DepthMethod>,
+    pub depth_method: Option<DepthMethod>,
     pub executor: String,
     /// Time budget for the blur of a frame.
     pub budget_ns: u64,
@@ -126,21 +126,21 @@ pub struct State {
     /// Whether the self-timer is counting down to a snapshot.
     pub self_timer: bool,
     /// Location of the last saved file.
-    pub kept_in: Option<PathBuf>,
+    pub saved_in: Option<PathBuf>,
     /// The displayed view of a frame.
     pub shown: Shown,
     /// Whether the window mirrors the picture.
     pub mirror: bool,
     /// Whether frames still use other kernels while those of the chosen look are being built.
-    pub between: bool,
+    pub is_transitional: bool,
     /// The crop that outputs get; `None` for the whole picture.
-    pub part: Option<Crop>,
+    pub crop: Option<Crop>,
     /// Whether the user set `mirror`; otherwise it depends on the camera.
     pub mirror_chosen: bool,
     /// Whether the displayed picture is frozen.
     pub frozen: bool,
     /// Whether the final picture of a photo is displayed: later ones would be identical.
-    pub settled: bool,
+    pub shows_final_photo: bool,
     /// Whether outputs get the still card instead of the picture, and the camera is paused.
     pub off: bool,
     /// Playback position, if the source is a recording.
@@ -155,7 +155,7 @@ pub struct State {
     /// Whether the instruments are shown.
     pub instruments: bool,
     /// Whether all controls and overlays are hidden.
-    pub bare: bool,
+    pub controls_hidden: bool,
     /// Whether the help is shown.
     pub help: bool,
     /// Whether the window fills the screen.
@@ -171,28 +171,28 @@ pub struct State {
     /// Progress of the background plate, if depth comes from it.
     pub plate: Option<Step>,
     /// Whether the user declined other depth methods.
-    pub declined_plate: bool,
+    pub depth_offer_declined: bool,
     /// Whether the user dismissed the notice that this is a demonstration.
-    pub knows_demonstration: bool,
+    pub demonstration_dismissed: bool,
     /// Whether the dialog that confirms closing is open.
     pub closing: bool,
     /// Settings that persist between runs.
-    pub habits: Habits,
+    pub preferences: Preferences,
     /// Bytes of the recording so far, if known.
     pub recorded_bytes: Option<u64>,
     /// Failure of an output, until the user dismisses it.
-    pub trouble: Option<String>,
+    pub output_failure: Option<String>,
     pub meters: Meters,
     /// Undo and redo history of the look.
     pub history: History,
     /// Whether the effect differs from the chosen one because the source has no depth.
     effect_replaced: bool,
     /// Number of the last note.
-    noted: u64,
+    last_note_number: u64,
 }
 
 /// Shown once the background plate is captured.
-const PLATE_TAKEN: &str = "Come back: the room behind you is known now. Keep the camera where it is.";
+const PLATE_CAPTURED: &str = "Come back: the room behind you is known now. Keep the camera where it is.";
 /// Maximum number of notes that are kept.
 const MAX_NOTES: usize = 6;
 
@@ -204,11 +204,11 @@ impl State {
 
     /// Adds a message, translated into the display language.
     pub fn note(&mut self, text: impl Into<String>) {
-        let text = translated(&text.into());
+        let text = translate_sentence(&text.into());
         // A repeated message replaces the earlier one and is shown anew.
         self.notes.retain(|note| note.text != text);
-        self.noted += 1;
-        self.notes.push(Note { number: self.noted, text });
+        self.last_note_number += 1;
+        self.notes.push(Note { number: self.last_note_number, text });
         if self.notes.len() > MAX_NOTES {
             self.notes.remove(0);
         }
@@ -218,7 +218,7 @@ impl State {
     pub fn set_plate_step(&mut self, step: Option<Step>) -> bool {
         let before = std::mem::replace(&mut self.plate, step);
         if step == Some(Step::Ready) && before.is_some_and(|before| before != Step::Ready) {
-            self.note(PLATE_TAKEN);
+            self.note(PLATE_CAPTURED);
         }
         before != step
     }
@@ -229,39 +229,42 @@ impl State {
     }
 
     /// Returns the depth methods that the source supports.
-    pub fn ways(&self) -> &[DepthMethod] {
+    pub fn depth_methods(&self) -> &[DepthMethod] {
         match &self.source {
-            Source::Running(running) => &running.ways,
+            Source::Running(running) => &running.depth_methods,
             Source::Opening | Source::Lost(_) | Source::Ended => &[],
         }
     }
 
     /// Returns the active depth method.
-    pub fn way(&self) -> Option<DepthMethod> {
-        if let Source::Running(running) = &self.source { running.way } else { None }
+    pub fn depth_method(&self) -> Option<DepthMethod> {
+        if let Source::Running(running) = &self.source { running.depth_method } else { None }
     }
 
     /// Whether a background plate can be captured.
     pub fn can_capture_plate(&self) -> bool {
-        self.ways().contains(&DepthMethod::Plate)
+        self.depth_methods().contains(&DepthMethod::Plate)
     }
 
     /// Returns person segmentation as a fallback while the plate is missing or does not match the picture.
-    pub fn way_without_plate(&self) -> Option<DepthMethod> {
+    pub fn method_without_plate(&self) -> Option<DepthMethod> {
         let lacks_plate = self.plate.is_some_and(|step| step != Step::Ready);
-        Some(DepthMethod::Person).filter(|way| lacks_plate && self.ways().contains(way))
+        Some(DepthMethod::Person).filter(|depth_method| lacks_plate && self.depth_methods().contains(depth_method))
     }
 
     /// Whether the source has no depth and the user is offered methods to get it.
-    pub fn offers_depth(&self) -> bool {
+    pub fn offers_depth_methods(&self) -> bool {
         let is_plain = matches!(&self.source, Source::Running(running) if !running.has_depth);
-        is_plain && !self.declines_own_depth() && !self.declined_plate && self.plate.is_none()
+        is_plain && !self.has_declined_depth() && !self.depth_offer_declined && self.plate.is_none()
     }
 
     /// Whether the source could measure its own depth, but the user turned that off.
-    fn declines_own_depth(&self) -> bool {
+    fn has_declined_depth(&self) -> bool {
         !self.may_have_depth()
-            && self.ways().iter().any(|way| matches!(way, DepthMethod::Measured | DepthMethod::Stereo))
+            && self
+                .depth_methods()
+                .iter()
+                .any(|depth_method| matches!(depth_method, DepthMethod::Measured | DepthMethod::Stereo))
     }
 
     /// Returns a short display name of the source; empty if unknown.
@@ -278,8 +281,8 @@ impl State {
     }
 
     /// Whether the panel is expanded.
-    pub fn shows_more(&self) -> bool {
-        self.habits.sections.get("More").copied().unwrap_or(false)
+    pub fn is_expanded(&self) -> bool {
+        self.preferences.sections.get("More").copied().unwrap_or(false)
     }
 
     /// Whether the source is a photo.
@@ -288,13 +291,13 @@ impl State {
     }
 
     /// Whether the displayed picture stays: it is frozen, a photo's final one, or the source has stopped.
-    pub fn keeps_picture(&self) -> bool {
-        self.frozen || self.settled || matches!(self.source, Source::Lost(_) | Source::Ended)
+    pub fn is_picture_static(&self) -> bool {
+        self.frozen || self.shows_final_photo || matches!(self.source, Source::Lost(_) | Source::Ended)
     }
 
     /// Whether the pipeline can pause: the window keeps its picture, and the source can stand still.
-    pub fn stands_still(&self) -> bool {
-        (self.frozen || self.settled) && matches!(&self.source, Source::Running(running) if !running.is_live)
+    pub fn can_pause_pipeline(&self) -> bool {
+        (self.frozen || self.shows_final_photo) && matches!(&self.source, Source::Running(running) if !running.is_live)
     }
 
     /// Whether frames have depth; assumed true while no source is running.
@@ -306,7 +309,7 @@ impl State {
     }
 
     /// Returns the distance of the focal plane in the last frame in metres, or 1 if unknown.
-    pub fn distance_m(&self) -> f32 {
+    pub fn focus_distance_m(&self) -> f32 {
         self.focus_m.filter(|metres| metres.is_finite()).unwrap_or(1.0)
     }
 

@@ -28,8 +28,8 @@ pub fn running(has_depth: bool) -> Source {
         is_live: true,
         kind: Kind::Camera,
         depth_from: if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing },
-        ways: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
-        way: has_depth.then_some(DepthMethod::Measured),
+        depth_methods: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
+        depth_method: has_depth.then_some(DepthMethod::Measured),
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,
     })
@@ -43,7 +43,11 @@ pub fn state() -> State {
     let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
     state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
     state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
-    let preset = |name: &str, look: Look, is_user_defined: bool| Preset { name: name.into(), patch: Patch::from_look(&look), is_user_defined };
+    let preset = |name: &str, look: Look, is_user_defined: bool| Preset {
+        name: name.into(),
+        patch: Patch::from_look(&look),
+        is_user_defined,
+    };
     state.presets = vec![
         preset("portrait", look(), false),
         preset("cinematic", blurred(30.0), false),
@@ -62,7 +66,7 @@ pub fn state() -> State {
     };
     let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
     // Expands the panel.
-    state.habits.sections.insert("More".into(), true);
+    state.preferences.sections.insert("More".into(), true);
     state.controls = vec![
         control("brightness", 10, (-64, 64, 1)),
         CameraControl { is_boolean: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },

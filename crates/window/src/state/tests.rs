@@ -45,7 +45,7 @@ fn the_changes_of_a_stroke_are_one() {
     for radius_px in 1..=20 {
         set(&mut state, radius_px as f32, Some("slider"));
     }
-    state.apply(Action::Settle);
+    state.apply(Action::EndStroke);
     for radius_px in 30..=40 {
         set(&mut state, radius_px as f32, Some("slider"));
     }
@@ -120,11 +120,11 @@ fn a_photo_is_told_what_gives_it_depth() {
         state.apply(Action::Show(Shown::Depth));
         assert_eq!(state.notes.last().unwrap().text, hint);
     }
-    assert!(!state.stands_still(), "not before its picture is there");
-    state.settled = true;
-    assert!(state.stands_still() && state.keeps_picture() && !state.frozen);
+    assert!(!state.can_pause_pipeline(), "not before its picture is there");
+    state.shows_final_photo = true;
+    assert!(state.can_pause_pipeline() && state.is_picture_static() && !state.frozen);
     state.apply(Action::Open("another".into()));
-    assert!(!state.stands_still() && !state.keeps_picture());
+    assert!(!state.can_pause_pipeline() && !state.is_picture_static());
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn what_is_set_beyond_its_range_is_at_its_end() {
     }
     for (asked, got) in [(1.5, 1.5), (9.0, 3.0), (0.0, 0.75), (f32::NAN, 0.75)] {
         state.apply(Action::TextScale(asked));
-        assert_eq!(state.habits.text_scale, got);
+        assert_eq!(state.preferences.text_scale, got);
     }
 }
 
@@ -173,20 +173,20 @@ fn what_is_set_beyond_its_range_is_at_its_end() {
 fn outputs_begin_once_and_end_once() {
     let mut state = state();
     let recording = Output { name: String::new(), is_camera: false };
-    assert_eq!(state.apply(Action::Record(true)), [Request::Begin(recording.clone())]);
+    assert_eq!(state.apply(Action::Record(true)), [Request::StartOutput(recording.clone())]);
     assert_eq!(state.apply(Action::Record(true)), [], "twice at once");
     let named = Output { name: "clip.mp4".into(), is_camera: false };
     state.apply_update(Update::Outputs(vec![named.clone()]));
     assert_eq!(state.recording(), Some(&named));
-    assert_eq!(state.apply(Action::Record(false)), [Request::End(named)]);
+    assert_eq!(state.apply(Action::Record(false)), [Request::StopOutput(named)]);
     assert_eq!(state.apply(Action::Record(false)), []);
 
     let camera = |name: &str| Output { name: name.into(), is_camera: true };
     let choose = |name: &str| Action::VirtualCamera(Some(name.to_owned()));
-    assert_eq!(state.apply(choose("a")), [Request::Begin(camera("a"))]);
+    assert_eq!(state.apply(choose("a")), [Request::StartOutput(camera("a"))]);
     assert_eq!(state.apply(choose("a")), []);
-    assert_eq!(state.apply(choose("b")), [Request::End(camera("a")), Request::Begin(camera("b"))]);
-    assert_eq!(state.apply(Action::VirtualCamera(None)), [Request::End(camera("b"))]);
+    assert_eq!(state.apply(choose("b")), [Request::StopOutput(camera("a")), Request::StartOutput(camera("b"))]);
+    assert_eq!(state.apply(Action::VirtualCamera(None)), [Request::StopOutput(camera("b"))]);
     assert_eq!(state.apply(Action::VirtualCamera(None)), []);
     assert_eq!(state.notes.last().unwrap().text, NO_VIRTUAL_CAMERA);
 }
@@ -232,29 +232,29 @@ fn notes_are_few_and_numbered_and_none_is_there_twice() {
 #[test]
 fn what_went_wrong_stays_until_it_is_known() {
     let mut state = state();
-    state.apply_update(Update::Trouble("the disk is full".into()));
+    state.apply_update(Update::OutputFailure("the disk is full".into()));
     for k in 0..20 {
         state.apply_update(Update::Note(format!("note {k}")));
     }
-    assert_eq!(state.trouble.as_deref(), Some("the disk is full"));
-    assert_eq!(state.apply(Action::Dismiss), []);
-    assert_eq!(state.trouble, None);
+    assert_eq!(state.output_failure.as_deref(), Some("the disk is full"));
+    assert_eq!(state.apply(Action::DismissFailure), []);
+    assert_eq!(state.output_failure, None);
 }
 
 #[test]
 fn the_wheel_gets_away_from_no_blur_and_back() {
     let mut look = look();
     for _ in 0..200 {
-        tweak::blur_by(&mut look, 0.8, 720);
+        tweak::scale_blur(&mut look, 0.8, 720);
     }
     assert_eq!(look.strength, Strength::Percent(0.0));
     for _ in 0..200 {
-        tweak::blur_by(&mut look, 1.25, 720);
+        tweak::scale_blur(&mut look, 1.25, 720);
     }
     assert_eq!(look.strength, Strength::Percent(bokehcam::look::MAX_COC_PER_HEIGHT * 100.0));
-    look.strength = Strength::Lens(tweak::LENS);
+    look.strength = Strength::Lens(tweak::DEFAULT_LENS);
     for (factor, f_number) in [(1.0, 1.8), (1e3, 0.7), (1e-6, 22.0)] {
-        tweak::blur_by(&mut look, factor, 720);
+        tweak::scale_blur(&mut look, factor, 720);
         let Strength::Lens(lens) = look.strength else { panic!("{:?}", look.strength) };
         assert!((lens.f_number - f_number).abs() < 1e-5, "{factor}: {lens:?}");
     }
@@ -264,14 +264,14 @@ fn the_wheel_gets_away_from_no_blur_and_back() {
 fn amount_and_lens_are_converted_and_the_f_number_goes_the_way_it_says() {
     for (size, percent, focus_m) in [((1280, 720), 2.2, 1.2), ((640, 480), 1.0, 2.5), ((1080, 1920), 3.0, 4.0)] {
         let look = Look { strength: Strength::Percent(percent), ..look() };
-        let lens = tweak::lens_of(&look, focus_m, size);
-        let back = 100.0 * tweak::lens_fraction(lens, focus_m, size);
+        let lens = tweak::lens_for_look(&look, focus_m, size);
+        let back = 100.0 * tweak::lens_coc_fraction(lens, focus_m, size);
         assert!((back - percent).abs() < 1e-3 * percent, "{size:?}: {percent} % is {lens:?}, which is {back} %");
         for factor in [1.122, 1.0 / 1.122] {
             let mut look = look.clone();
-            tweak::f_number_by(&mut look, factor, focus_m, size);
+            tweak::scale_f_number(&mut look, factor, focus_m, size);
             let Strength::Lens(turned) = look.strength else { panic!("{:?}", look.strength) };
-            let turned = tweak::lens_fraction(turned, focus_m, size);
+            let turned = tweak::lens_coc_fraction(turned, focus_m, size);
             // At the limit of f-numbers, it stays.
             assert!(if factor > 1.0 { turned < percent / 100.0 } else { turned >= 0.999 * percent / 100.0 });
         }
@@ -282,7 +282,7 @@ fn amount_and_lens_are_converted_and_the_f_number_goes_the_way_it_says() {
 fn numbers_are_as_one_would_write_them() {
     let mut look = look();
     for factor in [1.122, 1.0023, 0.97, 1.3333] {
-        tweak::blur_by(&mut look, factor, 720);
+        tweak::scale_blur(&mut look, factor, 720);
         tweak::move_focus(&mut look, 0.017, 0.003);
     }
     for (name, value) in bokehcam::look::Patch::from_look(&look).values() {
@@ -290,9 +290,9 @@ fn numbers_are_as_one_would_write_them() {
         assert!(digits.max().unwrap_or(0) <= 5, "{name} = {value}");
     }
     // However small the steps, they accumulate.
-    let before = tweak::amount(&look, 720);
-    (0..40).for_each(|_| tweak::blur_by(&mut look, 1.0023, 720));
-    assert!(tweak::amount(&look, 720) > before.map(|fraction| 1.05 * fraction));
+    let before = tweak::coc_fraction(&look, 720);
+    (0..40).for_each(|_| tweak::scale_blur(&mut look, 1.0023, 720));
+    assert!(tweak::coc_fraction(&look, 720) > before.map(|fraction| 1.05 * fraction));
 }
 
 #[test]
@@ -318,14 +318,14 @@ fn arrows_move_what_is_sharp() {
 #[test]
 fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     let mut state = state();
-    assert!(!state.can_capture_plate() && !state.offers_depth());
-    assert_eq!((state.apply(Action::TakePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
+    assert!(!state.can_capture_plate() && !state.offers_depth_methods());
+    assert_eq!((state.apply(Action::CapturePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
     state.apply_update(Update::Source(running(false)));
-    assert!(state.can_capture_plate() && state.offers_depth());
-    state.apply(Action::DeclinePlate);
-    assert!(state.declined_plate);
-    assert_eq!(state.apply(Action::TakePlate), [Request::TakePlate]);
-    assert!(!state.declined_plate);
+    assert!(state.can_capture_plate() && state.offers_depth_methods());
+    state.apply(Action::DeclineDepthOffer);
+    assert!(state.depth_offer_declined);
+    assert_eq!(state.apply(Action::CapturePlate), [Request::CapturePlate]);
+    assert!(!state.depth_offer_declined);
     let notes = state.notes.len();
     for (step, is_new) in
         [(Step::StepOut(3), true), (Step::StepOut(3), false), (Step::Capturing(50), true), (Step::Ready, true)]
@@ -344,7 +344,7 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let mut state = state();
     let chosen = state.look.clone();
     state.apply_update(Update::Source(running(false)));
-    assert_eq!((chosen.effect, state.look.effect, state.chosen_look()), (Effect::Auto, Effect::Blur, chosen));
+    assert_eq!((chosen.effect, state.look.effect, state.look_as_chosen()), (Effect::Auto, Effect::Blur, chosen));
     state.apply(Action::Preset("miniature".into()));
-    assert_eq!(state.chosen_look().effect, Effect::TiltShift, "that was chosen");
+    assert_eq!(state.look_as_chosen().effect, Effect::TiltShift, "that was chosen");
 }

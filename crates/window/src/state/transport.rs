@@ -6,7 +6,7 @@ use super::{Action, Request, State};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transport {
     /// Index of the displayed frame, or of the one requested last.
-    pub place: usize,
+    pub frame: usize,
     /// Number of frames, at least 1.
     pub frames: usize,
     /// Time of that frame, from the first one.
@@ -22,17 +22,17 @@ impl State {
     }
 
     /// Seeks to a frame of the recording.
-    pub(super) fn seek(&mut self, place: usize) -> Vec<Request> {
+    pub(super) fn seek(&mut self, frame: usize) -> Vec<Request> {
         let Some(transport) = &mut self.transport else { return Vec::new() };
-        transport.place = place.min(transport.frames.saturating_sub(1));
-        vec![Request::Seek(transport.place)]
+        transport.frame = frame.min(transport.frames.saturating_sub(1));
+        vec![Request::Seek(transport.frame)]
     }
 
     /// Pauses and moves by this number of frames, wrapping around at either end.
-    pub(super) fn step(&mut self, by: i32) -> Vec<Request> {
-        let Some(Transport { place, frames, .. }) = self.transport else { return Vec::new() };
+    pub(super) fn step_frames(&mut self, by: i32) -> Vec<Request> {
+        let Some(Transport { frame, frames, .. }) = self.transport else { return Vec::new() };
         let mut requests = self.apply(Action::Freeze(true));
-        requests.extend(self.seek((place as i64 + i64::from(by)).rem_euclid(frames.max(1) as i64) as usize));
+        requests.extend(self.seek((frame as i64 + i64::from(by)).rem_euclid(frames.max(1) as i64) as usize));
         requests
     }
 }

@@ -23,7 +23,7 @@ impl Default for Zoom {
 impl Zoom {
     /// Returns the next larger factor (`by` > 0) or the next smaller one. Skips factors below `fit`, the scale that
     /// fits the picture to the window.
-    pub fn stepped(self, by: i32, fit: f32) -> u32 {
+    pub fn next_factor(self, by: i32, fit: f32) -> u32 {
         let mut factors = FACTORS.into_iter().filter(|&factor| factor == 0 || factor as f32 > 0.99 * fit);
         match by > 0 {
             true => factors.find(|factor| *factor > self.factor).unwrap_or(self.factor),

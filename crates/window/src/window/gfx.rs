@@ -7,7 +7,7 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::{Fullscreen, Window};
 
 use super::WindowError;
-use super::memory::Size;
+use super::saved_state::WindowSize;
 use crate::present::{self, Area, Part, Presenter, enlarged, fitted};
 use crate::state::Zoom;
 use bokehcam::compute::device::Device;
@@ -32,7 +32,7 @@ impl Gfx {
     pub fn open(
         events: &ActiveEventLoop,
         ctx: &egui::Context,
-        size: Option<Size>,
+        size: Option<WindowSize>,
         full_screen: bool,
         device: Option<Arc<Device>>,
     ) -> Result<Self, WindowError> {
@@ -79,10 +79,10 @@ impl Gfx {
     }
 
     /// Returns the size to save; `None` in full screen, which is not the window's own size.
-    pub fn size(&self) -> Option<Size> {
+    pub fn size(&self) -> Option<WindowSize> {
         let LogicalSize { width, height } = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
         let maximized = self.window.is_maximized();
-        (self.window.fullscreen().is_none() && width > 0.0).then_some(Size { width, height, maximized })
+        (self.window.fullscreen().is_none() && width > 0.0).then_some(WindowSize { width, height, maximized })
     }
 }
 

@@ -6,7 +6,7 @@
 mod app;
 mod desktop;
 mod gfx;
-mod memory;
+mod saved_state;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use egui_winit::accesskit_winit;
 use winit::event_loop::EventLoop;
 
 use app::App;
-pub use memory::{Memory, Size};
+pub use saved_state::{SavedState, WindowSize};
 
 use super::session;
 use super::state::State;
@@ -43,7 +43,7 @@ enum UserEvent {
     /// The session sent an event.
     Session,
     /// A screen reader connected, disconnected, or requests an action.
-    Access(accesskit_winit::Event),
+    Accessibility(accesskit_winit::Event),
     /// The desktop's colour scheme changed.
     Theme(egui::Theme),
     /// A missing font was found.
@@ -54,12 +54,12 @@ enum UserEvent {
 
 impl From<accesskit_winit::Event> for UserEvent {
     fn from(event: accesskit_winit::Event) -> Self {
-        Self::Access(event)
+        Self::Accessibility(event)
     }
 }
 
 /// Name and rules of remote control.
-pub struct Control {
+pub struct RemoteConfig {
     pub claim: Claim,
     pub rules: Arc<dyn Rules>,
 }
@@ -69,7 +69,7 @@ pub struct Preview {
     /// Initial state of the window.
     pub state: State,
     /// Configuration of the session.
-    pub session: session::Start,
+    pub session: session::SessionConfig,
     /// Colour theme.
     pub theme: ThemeChoice,
     /// GPU to draw with, if any.
@@ -77,23 +77,23 @@ pub struct Preview {
     /// Whether to close the window when the source ends.
     pub close_at_end: bool,
     /// State saved by the previous preview, and its file.
-    pub memory: Memory,
-    pub memory_file: Option<PathBuf>,
+    pub saved_state: SavedState,
+    pub saved_state_file: Option<PathBuf>,
     /// Remote control, or a line with the reason why it is unavailable.
-    pub control: Result<Control, String>,
+    pub control: Result<RemoteConfig, String>,
     /// Closes the window once set.
     pub stop: Arc<AtomicBool>,
 }
 
 /// Result of a preview.
 #[derive(Clone, Debug, Default)]
-pub struct Ended {
+pub struct PreviewOutcome {
     /// Report of the last run.
     pub report: Option<Report>,
     /// Reason why the source delivered no frames when the window closed.
-    pub lost: Option<String>,
+    pub source_error: Option<String>,
     /// Message of the first output that failed.
-    pub unwritten: Option<String>,
+    pub output_error: Option<String>,
 }
 
 /// Reasons why there is no window.
@@ -114,21 +114,21 @@ pub enum WindowError {
 ///
 /// # Errors
 /// Fails if there is no display, or the window cannot be drawn to.
-pub fn show(preview: Preview) -> Result<Ended, WindowError> {
-    let mut events = event_loop()?;
+pub fn run_preview(preview: Preview) -> Result<PreviewOutcome, WindowError> {
+    let mut events = create_event_loop()?;
     let proxy = events.create_proxy();
     let mut app = App::new(preview, proxy)?;
     let ran = {
         use winit::platform::run_on_demand::EventLoopExtRunOnDemand;
         events.run_app_on_demand(&mut app)
     };
-    let ended = app.end();
-    ran.map_err(|error| WindowError::NoWindow(plain(&error)))?;
-    ended
+    let outcome = app.finish();
+    ran.map_err(|error| WindowError::NoWindow(strip_source_location(&error)))?;
+    outcome
 }
 
 /// Returns an error's text without the source location that winit puts before it.
-fn plain(error: &impl std::fmt::Display) -> String {
+fn strip_source_location(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     match text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
         Some((_, what)) => what.to_owned(),
@@ -138,14 +138,14 @@ fn plain(error: &impl std::fmt::Display) -> String {
 
 /// Creates the event loop. winit panics if a library that the display needs is missing: that becomes an error too, and
 /// the panic hook is silenced meanwhile.
-fn event_loop() -> Result<EventLoop<UserEvent>, WindowError> {
+fn create_event_loop() -> Result<EventLoop<UserEvent>, WindowError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let made = std::panic::catch_unwind(|| EventLoop::with_user_event().build());
     std::panic::set_hook(hook);
     match made {
         Ok(Ok(events)) => Ok(events),
-        Ok(Err(error)) => Err(WindowError::NoWindow(plain(&error))),
+        Ok(Err(error)) => Err(WindowError::NoWindow(strip_source_location(&error))),
         Err(panic) => {
             let why = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
             Err(WindowError::NoWindow(why.unwrap_or("a library is missing").to_owned()))

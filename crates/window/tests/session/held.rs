@@ -31,7 +31,7 @@ fn holding(source: &str) -> (Watched, View) {
 
 fn hold(watched: &Watched, view: &View) {
     let (color, depth) = (view.color.as_deref().unwrap().clone(), view.depth.as_deref().cloned());
-    watched.session.hold(still(7, Images { color, depth, ..Images::default() }, view.coc), false);
+    watched.session.hold_frame(still(7, Images { color, depth, ..Images::default() }, view.coc), false);
 }
 
 fn still(number: u64, images: Images, coc: CocField) -> Still {
@@ -73,7 +73,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
     }
     let plain = in_look(&mut watched, &Look { effect: Effect::None, ..look() });
     assert_eq!((plain.images.blurred.rgb, plain.quality), (color.rgb.clone(), None));
-    watched.session.let_go();
+    watched.session.release_frame();
     watched.session.send(Request::Look(Box::new(look())));
     watched.frame("the next frames come in the look", |view| matches!(view.coc, CocField::Depth(_)));
     assert!(watched.blurred.is_empty());
@@ -99,7 +99,7 @@ fn a_frame_without_depth_says_so_when_depth_is_needed() {
     let (mut watched, view) = holding("32");
     let color = view.color.as_deref().unwrap().clone();
     let images = Images { color, ..Images::default() };
-    watched.session.hold(still(8, images, view.coc), false);
+    watched.session.hold_frame(still(8, images, view.coc), false);
     watched.session.send(Request::Look(Box::new(Look { strength: Strength::AtInfinity(3.0), ..look() })));
     watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains("without depth")));
     let even = in_look(&mut watched, &Look { effect: Effect::Blur, ..look() });
@@ -133,9 +133,9 @@ fn nothing_is_captured_while_nobody_watches_unless_it_is_written() {
     };
     rests(&mut watched);
     let film = Output { name: "film".into(), is_camera: false };
-    watched.session.send(Request::Begin(film.clone()));
+    watched.session.send(Request::StartOutput(film.clone()));
     watched.frame("frames come for the film", |_| true);
-    watched.session.send(Request::End(film));
+    watched.session.send(Request::StopOutput(film));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     rests(&mut watched);

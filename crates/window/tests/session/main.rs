@@ -61,7 +61,7 @@ fn a_look_takes_effect_while_frames_go_on() {
 fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     let mut watched = Watched::begin("nothing");
     watched.until("why", |told| *told == Update::Source(Source::Lost("no such source: nothing".into())));
-    watched.session.send(Request::Begin(Output { name: "film".into(), is_camera: false }));
+    watched.session.send(Request::StartOutput(Output { name: "film".into(), is_camera: false }));
     watched.until("nothing to write", |told| matches!(told, Update::Note(line) if line.contains("no source")));
     watched.session.send(Request::Open("32".into()));
     watched.until("it runs", |told| is_running(told, 32));
@@ -83,7 +83,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
     assert!(watched.guide.is_none());
-    watched.session.send(Request::TakePlate);
+    watched.session.send(Request::CapturePlate);
     watched.until("it runs again", |told| is_running(told, 32));
     let guide = watched.guide.clone().expect("how far the plate is");
     watched.frame("all is far until there is a plate", |view| {
@@ -91,7 +91,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
     });
     assert!(matches!(guide.step(), Step::StepOut(1..=3)), "{:?}", guide.step());
     watched.frame("the countdown is over", |_| !matches!(guide.step(), Step::StepOut(_)));
-    watched.session.send(Request::TakePlate);
+    watched.session.send(Request::CapturePlate);
     watched.frame("the countdown has begun again", |_| matches!(guide.step(), Step::StepOut(_)));
     assert!(!watched.told.iter().any(|told| is_running(told, 32)), "no new run");
     // Another source has no plate, nor has this one when it is reopened.
@@ -108,13 +108,13 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
     let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
-    watched.session.send(Request::Begin(output("full", false)));
+    watched.session.send(Request::StartOutput(output("full", false)));
     watched.until("why not", |told| *told == Update::Note("the disk is full".into()));
     watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
-    watched.session.send(Request::Begin(output("film", false)));
-    watched.session.send(Request::Begin(output("camera", true)));
+    watched.session.send(Request::StartOutput(output("film", false)));
+    watched.session.send(Request::StartOutput(output("camera", true)));
     watched.until("two", |told| *told == Update::Outputs(vec![output("film", false), output("camera", true)]));
-    watched.session.copy(vec![("split".into(), "0.5".into())]);
+    watched.session.copy_command(vec![("split".into(), "0.5".into())]);
     watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
     watched.hear();
     // The film's file exists already: the command names another one.
@@ -124,7 +124,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let has =
         |watched: &Watched, line: &str| watched.services.written.lock().unwrap().iter().any(|written| written == line);
     until("both are written", PATIENCE, || has(&watched, "film 32") && has(&watched, "camera 32"));
-    watched.session.send(Request::End(output("film", false)));
+    watched.session.send(Request::StopOutput(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     // A recording ends with its source, and a virtual camera continues with the next one.
@@ -143,9 +143,9 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
     for (name, why) in [("fills up", "full now"), ("no end", "full at the end")] {
         let mut watched = Watched::begin("32");
         watched.until("it runs", |told| is_running(told, 32));
-        watched.session.send(Request::Begin(Output { name: name.into(), is_camera: false }));
+        watched.session.send(Request::StartOutput(Output { name: name.into(), is_camera: false }));
         if name == "fills up" {
-            watched.until("why", |told| matches!(told, Update::Trouble(line) if line.contains(why)));
+            watched.until("why", |told| matches!(told, Update::OutputFailure(line) if line.contains(why)));
             watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
         } else {
             watched.until("it is written", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));

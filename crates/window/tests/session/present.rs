@@ -52,7 +52,7 @@ fn at(image: &ColorImage, x: u32, y: u32) -> [u8; 3] {
 /// Creates an egui context with the window's fonts.
 fn context() -> egui::Context {
     let context = egui::Context::default();
-    panel::dress(&context);
+    panel::install_theme(&context);
     context
 }
 

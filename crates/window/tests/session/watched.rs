@@ -17,7 +17,7 @@ use bokehcam::pipeline::View;
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 use bokehcam_lab::synthetic::Synthetic;
-use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
+use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod, Source, Update};
 
 use super::heard::{self, Heard};
@@ -34,7 +34,7 @@ struct Small {
 struct Film(Arc<Mutex<Vec<String>>>, String);
 
 impl Sink for Film {
-    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         if self.1 == "fills up" {
             return Err(SinkError::Exists { path: "the disk is full now".into() });
         }
@@ -66,14 +66,14 @@ impl Capture for Plain {
 }
 
 impl Services for Small {
-    fn sources(&mut self) -> Vec<Choice> {
+    fn list_sources(&mut self) -> Vec<Choice> {
         vec![Choice { name: "32".into(), label: "A scene".into() }]
     }
-    fn virtual_cameras(&mut self) -> Vec<Choice> {
+    fn list_virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
-        let with_plate = way == Some(DepthMethod::Plate);
+    fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String> {
+        let with_plate = depth_method == Some(DepthMethod::Plate);
         let width =
             name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
         let frames = name.ends_with("no more").then_some(2);
@@ -88,12 +88,12 @@ impl Services for Small {
             source.depth = Some(Box::new(plate));
         }
         let has_depth = source.has_depth();
-        Ok(Opened {
+        Ok(OpenedSource {
             name,
             source,
             has_depth,
-            ways: vec![DepthMethod::Plate],
-            way,
+            depth_methods: vec![DepthMethod::Plate],
+            depth_method,
             notes,
             controls,
             camera: Camera::default(),
@@ -102,19 +102,19 @@ impl Services for Small {
     fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<CameraControl>, String> {
         Err("it has no controls".into())
     }
-    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+    fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.executors.fetch_add(1, Ordering::SeqCst);
         bokeh::create_blur(settings, size, None, Some(1)).map_err(|error| error.to_string())
     }
-    fn output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
+    fn open_output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
         if name == "full" {
             Err("the disk is full".into())
         } else {
             Ok(Box::new(Film(Arc::clone(&self.written), name.into())))
         }
     }
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
-        self.settings.command(look, source, outputs, switches)
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
+        self.settings.format_command(look, source, outputs, switches)
     }
     fn settings(&mut self) -> &mut dyn SettingsStore {
         &mut self.settings

@@ -33,7 +33,7 @@ named! {
 pub fn render_first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
     use bokehcam_lab::scene::{Scene as Rendered, View};
     let scene_model = match scene {
-        Scene::Sitter => Rendered::sitter(),
+        Scene::Sitter => Rendered::seated_person(),
         Scene::Portrait => Rendered::portrait(),
     };
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());

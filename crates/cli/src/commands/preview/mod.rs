@@ -25,11 +25,11 @@ use bokehcam::look::{Effect, Look};
 use bokehcam::pipeline::Pace;
 use bokehcam::sink::Target;
 use bokehcam::source::{self, SourceName};
-use bokehcam_window::session::Start;
+use bokehcam_window::session::SessionConfig;
 use bokehcam_window::state::{Output, State};
 use bokehcam_window::system::System;
 use bokehcam_window::texts;
-use bokehcam_window::window::{self, Control, Memory, Preview};
+use bokehcam_window::window::{self, Preview, RemoteConfig, SavedState};
 
 use store::FileStore;
 
@@ -116,21 +116,21 @@ pub fn show_source(
     let look = source::adapt_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
-    let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
+    let saved_state_file = file::state_folder().map(|folder| folder.join("window.toml"));
     // `--fresh` neither reads nor overwrites the remembered state.
-    let memory_file = memory_file.filter(|_| !window.fresh);
-    let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
+    let saved_state_file = saved_state_file.filter(|_| !window.fresh);
+    let saved_state = saved_state_file.as_deref().and_then(SavedState::read).unwrap_or_default();
     let mut dropped = Vec::new();
-    let restored = Some(&memory).filter(|_| !given.has_look());
-    let restored = restored.and_then(|memory| memory.look(|line| dropped.push(line)));
+    let restored = Some(&saved_state).filter(|_| !given.has_look());
+    let restored = restored.and_then(|saved_state| saved_state.restore_look(|line| dropped.push(line)));
     let restored = restored.filter(|restored| *restored != look);
-    let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
-    let texts =
-        texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
-    texts.into_iter().for_each(texts::speak);
+    let source = if name.is_empty() { saved_state.restore_source().unwrap_or_default() } else { name.to_owned() };
+    let texts = texts::load_translation(window.language.as_deref())
+        .map_err(|line| CliError::Usage(format!("--language: {line}")))?;
+    texts.into_iter().for_each(texts::set_translation);
     let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
-    let mut state = initial_state(look, &source, window, stream.mirror, &memory);
+    let mut state = initial_state(look, &source, window, stream.mirror, &saved_state);
     if let Some(restored) = restored {
         state.look = restored;
         state.note(RESTORED_LOOK);
@@ -145,7 +145,8 @@ pub fn show_source(
             ..unused::RunFacts::default()
         },
     };
-    let control = controlled::claim_name(run_name, "preview")?.map(|claim| Control { claim, rules: Arc::new(rules) });
+    let control =
+        controlled::claim_name(run_name, "preview")?.map(|claim| RemoteConfig { claim, rules: Arc::new(rules) });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
     let device = system.executors.open_device()?;
@@ -154,9 +155,9 @@ pub fn show_source(
     state.mirror_chosen = mirror_chosen;
     let close_at_end = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
-    let ended = window::show(Preview {
+    let outcome = window::run_preview(Preview {
         state,
-        session: Start {
+        session: SessionConfig {
             services: Box::new(system),
             look,
             source,
@@ -167,26 +168,26 @@ pub fn show_source(
             output_request: Arc::default(),
             demand: Demand::default(),
             off: Arc::default(),
-            release: Arc::default(),
+            shutter: Arc::default(),
             folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
         },
         theme: window.theme,
         device,
         close_at_end,
-        memory,
-        memory_file,
+        saved_state,
+        saved_state_file,
         control,
         stop,
     })?;
     // A report is written even if the preview failed.
-    let written = match (&stream.report, &ended.report) {
+    let written = match (&stream.report, &outcome.report) {
         (Some(path), Some(report)) => report::write_report(path, report, output.force),
         _ => Ok(()),
     };
-    ended.report.iter().for_each(|report| terminal::print_report(report, global));
-    match ended.lost {
-        Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
-        _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
+    outcome.report.iter().for_each(|report| terminal::print_report(report, global));
+    match outcome.source_error {
+        Some(why) if outcome.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
+        _ => outcome.output_error.map_or(written, |why| Err(CliError::OutputFailed(why))),
     }
 }
 
@@ -194,7 +195,7 @@ pub fn show_source(
 const RESTORED_LOOK: &str = "This is the look of your last session. R goes back to the usual one.";
 
 /// Returns the initial state of the window.
-fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
+fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, saved_state: &SavedState) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = window.show;
     state.split = window.split;
@@ -202,8 +203,8 @@ fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, memory
     state.full_screen = window.full_screen;
     state.instruments = window.instruments;
     state.panel = window.panel;
-    state.habits = memory.habits.clone();
-    window.text_scale.into_iter().for_each(|scale| state.habits.set_text_scale(scale));
-    state.habits.single_keys = window.single_keys.unwrap_or(state.habits.single_keys);
+    state.preferences = saved_state.preferences.clone();
+    window.text_scale.into_iter().for_each(|scale| state.preferences.set_text_scale(scale));
+    state.preferences.single_keys = window.single_keys.unwrap_or(state.preferences.single_keys);
     state
 }

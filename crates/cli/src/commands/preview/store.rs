@@ -13,7 +13,7 @@ use crate::terminal::print_to_stdout;
 use bokehcam::look::Value;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch};
-use bokehcam_window::services::{SettingsStore, Switch};
+use bokehcam_window::services::{CliOption, SettingsStore};
 
 /// The settings file, and the settings of the command line.
 pub(super) struct FileStore {
@@ -64,12 +64,12 @@ impl SettingsStore for FileStore {
         self.change_file(|file| presets::delete(file, name))
     }
 
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
         let mut switches = switches.to_vec();
-        let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
+        let is_new = |(name, _): &&CliOption| !switches.iter().any(|(other, _)| other == name);
         // A command with outputs is a `stream`, which has no window.
-        let has_effect = |(name, _): &&Switch| outputs.is_empty() || !WINDOW_START.contains(&name.as_str());
-        let given: Vec<Switch> = self.given.switches.iter().filter(is_new).filter(has_effect).cloned().collect();
+        let has_effect = |(name, _): &&CliOption| outputs.is_empty() || !WINDOW_START.contains(&name.as_str());
+        let given: Vec<CliOption> = self.given.switches.iter().filter(is_new).filter(has_effect).cloned().collect();
         // The window's own switches override those of the command line; camera controls come last.
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
@@ -111,11 +111,11 @@ mod tests {
             let made = preset.patch.apply_to(&Look::default()).unwrap();
             let focus = FocusRule::Point { x: 0.25, y: 0.5 };
             let fresh = [("fresh".to_owned(), "true".to_owned())];
-            let command = store.command(&Look { focus, ..made.clone() }, "demo", &[], &fresh);
+            let command = store.format_command(&Look { focus, ..made.clone() }, "demo", &[], &fresh);
             assert!(command.contains("--preset") && command.contains("--focus 0.25,0.5"), "{command}");
             assert!(!command.contains("--fresh") && !command.contains("--effect"), "{command}");
             let other = Look { rim: 0.77, tilt: Tilt { band: 0.3, ..made.tilt }, ..made };
-            let command = store.command(&other, "demo", &[], &[]);
+            let command = store.format_command(&other, "demo", &[], &[]);
             assert!(command.contains("--rim 0.77") && !command.contains("--preset"), "{command}");
             assert_eq!(command.contains("--tilt"), other.effect == Effect::TiltShift, "{command}");
         }
@@ -127,7 +127,7 @@ mod tests {
         let switches =
             vec![given("theme", "light"), given("language", "de"), given("save-to", "."), given("fps", "15")];
         let store = FileStore { chosen: None, given: GivenSettings { switches, ..GivenSettings::default() } };
-        let command = |outputs: &[String]| store.command(&Look::default(), "demo", outputs, &[]);
+        let command = |outputs: &[String]| store.format_command(&Look::default(), "demo", outputs, &[]);
         let window = command(&[]);
         for switch in ["--theme=light", "--language=de", "--save-to=.", "--fps=15"] {
             assert!(window.contains(switch), "{switch} is not in {window}");

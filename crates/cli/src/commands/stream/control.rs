@@ -220,7 +220,7 @@ impl ControllableRun for Stream {
         if self.run.demand.as_ref().is_some_and(|demand| !demand.is_watched()) {
             return Err(Answer::failed("no program reads it, so the camera is closed: there is no picture"));
         }
-        let picture = self.run.shutter.picture(PICTURE_TIMEOUT);
+        let picture = self.run.shutter.copy_next_picture(PICTURE_TIMEOUT);
         let picture =
             picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PICTURE_TIMEOUT.as_secs())))?;
         let path = to.map_or_else(|| Folders::of_user().free_picture(), Path::to_owned);

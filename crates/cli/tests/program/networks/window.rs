@@ -50,19 +50,23 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
     let mut system = System::new(Options::default(), Look::default(), Box::new(NoStore));
     for (name, usual) in [(PORTRAIT, DepthMethod::Measured), (STEREO, DepthMethod::Stereo)] {
         let opened = system.open(name, None).unwrap();
-        assert_eq!((opened.way, opened.ways.first(), opened.has_depth), (Some(usual), Some(&usual), true), "{name}");
-        assert!(!opened.ways.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
+        assert_eq!(
+            (opened.depth_method, opened.depth_methods.first(), opened.has_depth),
+            (Some(usual), Some(&usual), true),
+            "{name}"
+        );
+        assert!(!opened.depth_methods.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
         assert!(!opened.camera.is_relative);
         // Selecting the default method by name gives the same result.
         let again = system.open(name, Some(usual)).unwrap();
-        assert_eq!((again.way, &again.ways), (Some(usual), &opened.ways), "{name}");
+        assert_eq!((again.depth_method, &again.depth_methods), (Some(usual), &opened.depth_methods), "{name}");
     }
-    let none = system.check_depth_method(PORTRAIT, DepthMethod::PersonAndDistance);
-    let is_installed = system.open(PORTRAIT, None).unwrap().ways.contains(&DepthMethod::PersonAndDistance);
+    let none = system.check_depth_method(PORTRAIT, DepthMethod::PersonAndMonoDepth);
+    let is_installed = system.open(PORTRAIT, None).unwrap().depth_methods.contains(&DepthMethod::PersonAndMonoDepth);
     assert_eq!(none.is_ok(), is_installed);
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
     assert!(system.check_depth_method(PORTRAIT, DepthMethod::Stereo).is_err(), "it has one camera");
-    let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndDistance]
+    let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndMonoDepth]
         .map(DepthMethod::flag);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
 }

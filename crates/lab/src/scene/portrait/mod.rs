@@ -1,13 +1,13 @@
 //! Assembles the portrait scene.
 
 mod face;
-mod form;
 mod front;
 mod hair;
 mod head;
+mod materials;
 mod outside;
-mod paint;
 mod room;
+mod sdf;
 mod situation;
 mod torso;
 
@@ -32,21 +32,22 @@ const NAPE: Vec3 = Vec3::new(0.0, -0.15, 0.04);
 const HIP: Vec3 = Vec3::new(0.0, -0.75, 0.06);
 
 /// Returns a person with objects in front.
-pub fn with_front() -> Scene {
-    let mut scene = of(Some(Situation::Sits), Situation::Sits);
-    scene.parts.extend([front::desk(), front::twig()].map(Part::built));
+pub fn create_portrait() -> Scene {
+    let mut scene = create_scene(Some(Situation::Sits), Situation::Sits);
+    scene.parts.extend([front::create_desk(), front::create_twig()].map(Part::with_bvh));
     scene
 }
 
 /// Returns a person in a situation, or the empty room of a situation.
-pub fn of(person: Option<Situation>, room: Situation) -> Scene {
-    let own = person.map(|person| [vec![head::part(nod), torso::part(sway)], person.own()].concat());
+pub fn create_scene(person: Option<Situation>, room: Situation) -> Scene {
+    let own = person
+        .map(|person| [vec![head::create_part(nod_pose), torso::create_part(sway_pose)], person.worn_parts()].concat());
     let own: Vec<Part> = own.unwrap_or_default().into_iter().map(|part| Part { is_subject: true, ..part }).collect();
-    let others = person.map(Situation::others).unwrap_or_default();
-    let fixed = [room.furniture(), vec![room::part(), outside::part()]].concat();
+    let others = person.map(Situation::other_people).unwrap_or_default();
+    let fixed = [room.furniture(), vec![room::create_part(), outside::create_part()]].concat();
     Scene {
-        parts: [own, others, fixed].concat().into_iter().map(Part::built).collect(),
-        lights: [lights(), person.map(Situation::lights).unwrap_or_default()].concat(),
+        parts: [own, others, fixed].concat().into_iter().map(Part::with_bvh).collect(),
+        lights: [room_lights(), person.map(Situation::lights).unwrap_or_default()].concat(),
         ambient: Ambient { above: Vec3::new(0.155, 0.165, 0.20), below: Vec3::new(0.105, 0.080, 0.066) },
         background: Vec3::ZERO,
         focus_m: FOCUS_M,
@@ -54,12 +55,12 @@ pub fn of(person: Option<Situation>, room: Situation) -> Scene {
     }
 }
 
-fn lights() -> Vec<Light> {
-    let lamp = |position: [f32; 3], power: [f32; 3], softness, casts_within_m| Light {
+fn room_lights() -> Vec<Light> {
+    let lamp = |position: [f32; 3], power: [f32; 3], softness, self_shadow_range_m| Light {
         position: position.into(),
         power: power.into(),
         softness,
-        casts_within_m,
+        self_shadow_range_m,
     };
     vec![
         // Key light, high on the left in front: a large warm lamp.
@@ -76,19 +77,19 @@ fn lights() -> Vec<Light> {
 }
 
 /// Returns the pose of the body, which sways once per loop.
-fn sway(phase: f32) -> Pose {
+fn sway_pose(phase: f32) -> Pose {
     let turn =
         Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
-    Pose { turn: Mat3::IDENTITY, place: HEAD }.over(Pose::about(HIP, turn))
+    Pose { rotation: Mat3::IDENTITY, translation: HEAD }.compose(Pose::rotation_about(HIP, turn))
 }
 
 /// Returns the pose of the head, which turns and tilts on the swaying body.
-fn nod(phase: f32) -> Pose {
+fn nod_pose(phase: f32) -> Pose {
     let yaw = 0.11 + 0.10 * (TAU * phase + 0.6).sin();
     let pitch = 0.02 + 0.018 * (2.0 * TAU * phase).sin();
     let roll = -0.035 + 0.022 * (TAU * phase - 0.5).sin();
     let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_y(yaw) * Mat3::from_rotation_x(pitch);
     // The head sits a little lower than it was modelled.
-    let seat = Pose { turn: Mat3::IDENTITY, place: Vec3::new(0.0, -0.014, 0.0) };
-    sway(phase).over(Pose::about(NAPE, turn)).over(seat)
+    let seat = Pose { rotation: Mat3::IDENTITY, translation: Vec3::new(0.0, -0.014, 0.0) };
+    sway_pose(phase).compose(Pose::rotation_about(NAPE, turn)).compose(seat)
 }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3};
 
-use super::form::{blend, brick, hex};
-use super::front::half_leaf;
-use super::paint;
-use crate::scene::grid::Grid;
-use crate::scene::noise::{Dice, unit};
-use crate::scene::part::{Material, Paint, Part};
-use crate::scene::ray::Bounds;
-use crate::scene::shape::{Shape, whole};
+use super::front::is_in_half_leaf;
+use super::materials;
+use super::sdf::{linear_from_hex, rounded_box, smooth_union};
+use crate::scene::grid::DistanceGrid;
+use crate::scene::noise::{Rng, hash_to_unit};
+use crate::scene::part::{Material, Part, SurfaceShader};
+use crate::scene::ray::BoundingBox;
+use crate::scene::shape::{Shape, keep_whole};
 
 /// Depth of the wall.
 const WALL_M: f32 = 4.2;
@@ -22,17 +22,17 @@ const SOFA: Vec3 = Vec3::new(-0.98, -0.40, 2.35);
 const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 
 /// Creates the room behind the subject.
-pub fn part() -> Part {
-    let mut part = Part::still();
-    let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
-    let form = Arc::new(Grid::new(form, around, 0.03));
+pub fn create_part() -> Part {
+    let mut part = Part::new_static();
+    let around = BoundingBox { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
+    let grid = Arc::new(DistanceGrid::new(room_distance, around, 0.03));
     add_walls(&mut part);
     add_window(&mut part);
     add_shelves(&mut part);
     add_sideboard(&mut part);
     add_fairy_lights(&mut part);
-    add_seats(&mut part, &form);
-    part.form = Some(form);
+    add_seats(&mut part, &grid);
+    part.distance_grid = Some(grid);
     part
 }
 
@@ -43,25 +43,30 @@ fn add_box(part: &mut Part, low: [f32; 3], high: [f32; 3], material: Material) {
     part.add(shape, material);
 }
 
-fn paint(paint: Paint, code: u32) -> Material {
-    Material::new(paint, hex(code))
+fn create_material(shader: SurfaceShader, code: u32) -> Material {
+    Material::new(shader, linear_from_hex(code))
 }
 
 fn add_walls(part: &mut Part) {
-    let wall = paint(paint::wallpaper, 0x3d6663);
+    let wall = create_material(materials::shade_wallpaper, 0x3d6663);
     let (low, high) = WINDOW;
     add_box(part, [-4.0, -1.4, WALL_M], [low.x, 1.8, WALL_M + 0.12], wall);
     add_box(part, [high.x, -1.4, WALL_M], [4.0, 1.8, WALL_M + 0.12], wall);
     add_box(part, [low.x, -1.4, WALL_M], [high.x, low.y, WALL_M + 0.12], wall);
     let floor =
-        Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
-    part.add(floor, paint(paint::boards, 0x7a5233));
-    add_box(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
+        Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: keep_whole };
+    part.add(floor, create_material(materials::shade_boards, 0x7a5233));
+    add_box(
+        part,
+        [-4.0, FLOOR_Y, WALL_M - 0.02],
+        [4.0, FLOOR_Y + 0.09, WALL_M],
+        create_material(materials::shade_diffuse, 0x2a4442),
+    );
 }
 
 /// Adds frame and sill, curtains, and pots on the sill.
 fn add_window(part: &mut Part) {
-    let white = paint(paint::plain, 0xd9d2c4);
+    let white = create_material(materials::shade_diffuse, 0xd9d2c4);
     let (low, high) = WINDOW;
     let bar = 0.028;
     let across = 0.5 * (low.x + high.x);
@@ -73,7 +78,7 @@ fn add_window(part: &mut Part) {
     }
     add_box(part, [low.x - 0.08, low.y - 0.06, WALL_M - 0.20], [high.x + 0.08, low.y - 0.02, WALL_M], white);
     // Curtains hang in pleats.
-    let linen = paint(paint::curtain, 0xcdb892);
+    let linen = create_material(materials::shade_curtain, 0xcdb892);
     for (from, count) in [(low.x - 0.30, 9), (high.x - 0.06, 6)] {
         for k in 0..count {
             let x = from + 0.042 * k as f32;
@@ -94,28 +99,28 @@ fn add_window(part: &mut Part) {
 fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spread: f32) {
     let height = 1.7 * radius;
     let pot = Shape::Frustum { base: foot, height, low_radius: 0.75 * radius, high_radius: radius };
-    part.add(pot, paint(paint::ceramic, color));
+    part.add(pot, create_material(materials::shade_ceramic, color));
     let soil = Shape::Quad {
         centre: foot + 0.9 * height * Vec3::Y,
         right: radius * Vec3::X,
         up: radius * Vec3::Z,
         cut: |uv| uv.length_squared() < 0.95,
     };
-    part.add(soil, paint(paint::plain, 0x2b1d14));
-    let mut dice = Dice::new(seed);
+    part.add(soil, create_material(materials::shade_diffuse, 0x2b1d14));
+    let mut rng = Rng::new(seed);
     let top = foot + 0.9 * height * Vec3::Y;
     for _ in 0..26 {
-        let out = (spread * dice.direction() * Vec3::new(1.0, 0.5, 1.0) + dice.between(0.35, 1.0) * Vec3::Y)
+        let out = (spread * rng.direction() * Vec3::new(1.0, 0.5, 1.0) + rng.between(0.35, 1.0) * Vec3::Y)
             .normalize_or(Vec3::Y);
-        let length = radius * dice.between(0.7, 1.25);
-        let across = out.cross(Vec3::Z + 0.5 * dice.direction()).normalize_or(Vec3::X) * 0.36 * length;
-        let green = hex(0x3c6b3a).lerp(hex(0x7fa35a), dice.next());
-        let centre = top + out * (length + radius * dice.between(0.0, 0.9));
-        part.add_chain(&[(top, 0.003), (centre, 0.002)], paint(paint::plain, 0x4d6b3d));
+        let length = radius * rng.between(0.7, 1.25);
+        let across = out.cross(Vec3::Z + 0.5 * rng.direction()).normalize_or(Vec3::X) * 0.36 * length;
+        let green = linear_from_hex(0x3c6b3a).lerp(linear_from_hex(0x7fa35a), rng.next());
+        let centre = top + out * (length + radius * rng.between(0.0, 0.9));
+        part.add_chain(&[(top, 0.003), (centre, 0.002)], create_material(materials::shade_diffuse, 0x4d6b3d));
         for side in [-1.0, 1.0] {
             let wing = side * across + 0.08 * length * Vec3::Y;
-            let shape = Shape::Quad { centre, right: length * out, up: wing, cut: half_leaf };
-            part.add(shape, Material::new(paint::leaf, green).seeded(seed + length.to_bits()));
+            let shape = Shape::Quad { centre, right: length * out, up: wing, cut: is_in_half_leaf };
+            part.add(shape, Material::new(materials::shade_leaf, green).with_seed(seed + length.to_bits()));
         }
     }
 }
@@ -124,80 +129,97 @@ const BOOKS: [u32; 9] = [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9b
 
 /// Adds two boards with books and pots, and a picture on the wall.
 fn add_shelves(part: &mut Part) {
-    let board = paint(paint::wood, 0x8a5a33);
-    let mut dice = Dice::new(3);
+    let board = create_material(materials::shade_wood, 0x8a5a33);
+    let mut rng = Rng::new(3);
     for (y, from, to) in [(0.20f32, 0.66f32, 2.16f32), (0.66, 0.84, 2.16)] {
         add_box(part, [from, y - 0.032, 3.93], [to, y, WALL_M], board);
         for x in [from + 0.12, to - 0.3] {
-            add_box(part, [x, y - 0.13, 4.0], [x + 0.025, y - 0.032, WALL_M], paint(paint::metal, 0x4a3a28));
+            add_box(
+                part,
+                [x, y - 0.13, 4.0],
+                [x + 0.025, y - 0.032, WALL_M],
+                create_material(materials::shade_metal, 0x4a3a28),
+            );
         }
         let mut x = from + 0.06;
         while x < to - 0.10 {
             // A pot, a gap, or a book; some books lean.
-            let kind = dice.next();
+            let kind = rng.next();
             if kind < 0.13 && x > from + 0.2 {
-                let radius = dice.between(0.055, 0.075);
+                let radius = rng.between(0.055, 0.075);
                 let pot = Vec3::new(x + 1.2 * radius, y, 4.06);
-                add_pot(part, pot, radius, BOOKS[(dice.next() * 9.0) as usize % 9], (x * 977.0) as u32, 0.8);
+                add_pot(part, pot, radius, BOOKS[(rng.next() * 9.0) as usize % 9], (x * 977.0) as u32, 0.8);
                 x += 2.6 * radius;
             } else if kind < 0.20 {
-                x += dice.between(0.05, 0.12);
+                x += rng.between(0.05, 0.12);
             } else {
-                let width = dice.between(0.026, 0.056);
-                let height = dice.between(0.19, 0.30);
-                let depth = dice.between(0.12, 0.17);
+                let width = rng.between(0.026, 0.056);
+                let height = rng.between(0.19, 0.30);
+                let depth = rng.between(0.12, 0.17);
                 let lean = if kind > 0.93 { 0.16 } else { 0.0 };
                 let centre =
                     Vec3::new(x + 0.5 * width + 0.5 * height * lean, y + 0.5 * height, WALL_M - 0.04 - 0.5 * depth);
                 let half = 0.5 * Vec3::new(width - 0.002, height, depth);
-                let code = BOOKS[(dice.next() * 9.0) as usize % 9];
+                let code = BOOKS[(rng.next() * 9.0) as usize % 9];
                 let seed = (x * 1e4) as u32;
                 part.add(
                     Shape::Cuboid { centre, axes: Mat3::from_rotation_z(-lean), half },
-                    paint(paint::book, code).seeded(seed),
+                    create_material(materials::shade_book, code).with_seed(seed),
                 );
                 x += width + height * lean;
             }
         }
     }
     // A framed picture between the window and the shelves.
-    add_box(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], paint(paint::wood, 0x5d3b22));
-    let canvas =
-        Shape::Quad { centre: Vec3::new(0.27, 0.64, 4.163), right: 0.225 * Vec3::X, up: 0.175 * Vec3::Y, cut: whole };
-    part.add(canvas, paint(paint::landscape, 0xffffff));
+    add_box(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], create_material(materials::shade_wood, 0x5d3b22));
+    let canvas = Shape::Quad {
+        centre: Vec3::new(0.27, 0.64, 4.163),
+        right: 0.225 * Vec3::X,
+        up: 0.175 * Vec3::Y,
+        cut: keep_whole,
+    };
+    part.add(canvas, create_material(materials::shade_landscape, 0xffffff));
 }
 
 /// Adds a sideboard with three doors; on it a lamp, a pot and a pile of books.
 fn add_sideboard(part: &mut Part) {
-    let walnut = paint(paint::wood, 0x6d4527);
-    add_box(part, [0.62, -0.455, 3.70], [2.30, -0.42, WALL_M], paint(paint::wood, 0x8a5a33).seeded(4));
+    let walnut = create_material(materials::shade_wood, 0x6d4527);
+    add_box(
+        part,
+        [0.62, -0.455, 3.70],
+        [2.30, -0.42, WALL_M],
+        create_material(materials::shade_wood, 0x8a5a33).with_seed(4),
+    );
     add_box(part, [0.65, -0.95, 3.73], [2.27, -0.455, WALL_M], walnut);
     for k in 0..3 {
         let x = 0.68 + 0.53 * k as f32;
-        add_box(part, [x, -0.92, 3.715], [x + 0.50, -0.48, 3.735], walnut.seeded(9 + k));
+        add_box(part, [x, -0.92, 3.715], [x + 0.50, -0.48, 3.735], walnut.with_seed(9 + k));
         let knob = Shape::Sphere { centre: Vec3::new(x + 0.44, -0.66, 3.705), radius: 0.016 };
-        part.add(knob, paint(paint::metal, 0xc59a4a));
+        part.add(knob, create_material(materials::shade_metal, 0xc59a4a));
     }
     // The lamp.
     let foot = Vec3::new(1.42, -0.42, 3.92);
     let belly = Shape::ellipsoid(foot + 0.085 * Vec3::Y, Mat3::IDENTITY, Vec3::new(0.085, 0.085, 0.085));
-    part.add(belly, paint(paint::ceramic, 0x2f6f73));
-    part.add_chain(&[(foot + 0.16 * Vec3::Y, 0.012), (foot + 0.30 * Vec3::Y, 0.010)], paint(paint::metal, 0xc59a4a));
+    part.add(belly, create_material(materials::shade_ceramic, 0x2f6f73));
+    part.add_chain(
+        &[(foot + 0.16 * Vec3::Y, 0.012), (foot + 0.30 * Vec3::Y, 0.010)],
+        create_material(materials::shade_metal, 0xc59a4a),
+    );
     let shade = Shape::Frustum { base: foot + 0.235 * Vec3::Y, height: 0.22, low_radius: 0.175, high_radius: 0.115 };
-    part.add(shade, Material::new(paint::lamp_shade, Vec3::new(1.25, 0.80, 0.40)));
+    part.add(shade, Material::new(materials::shade_lamp_shade, Vec3::new(1.25, 0.80, 0.40)));
     add_pot(part, Vec3::new(0.86, -0.42, 3.92), 0.095, 0xc9bda3, 61, 1.0);
     for k in 0..4u32 {
         let y = -0.42 + 0.034 * k as f32;
-        let shift = 0.02 * unit(k) - 0.01;
+        let shift = 0.02 * hash_to_unit(k) - 0.01;
         let code = BOOKS[(2 * k as usize + 1) % 9];
         let low = [1.82 + shift, y, 3.80];
-        add_box(part, low, [2.08 + shift, y + 0.032, 3.98], paint(paint::book, code).seeded(k));
+        add_box(part, low, [2.08 + shift, y + 0.032, 3.98], create_material(materials::shade_book, code).with_seed(k));
     }
 }
 
 /// Adds strings of bulbs along the wall.
 fn add_fairy_lights(part: &mut Part) {
-    let wire = paint(paint::plain, 0x2c2a26);
+    let wire = create_material(materials::shade_diffuse, 0x2c2a26);
     let drapes = [
         (Vec3::new(-0.36, 0.98, 4.08), Vec3::new(0.66, 1.03, 4.10), 0.16, 13),
         (Vec3::new(0.66, 1.03, 4.10), Vec3::new(2.2, 1.00, 4.08), 0.13, 17),
@@ -211,28 +233,37 @@ fn add_fairy_lights(part: &mut Part) {
         for k in 0..count {
             let s = (k as f32 + 0.5) / count as f32;
             let centre = at(s) - 0.016 * Vec3::Y;
-            let power = 7.0 + 5.0 * unit(k + 31);
+            let power = 7.0 + 5.0 * hash_to_unit(k + 31);
             let bulb = Shape::Sphere { centre, radius: 0.015 };
-            part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.46, 0.09)));
+            part.add(bulb, Material::new(materials::shade_emissive, power * Vec3::new(1.0, 0.46, 0.09)));
         }
     }
 }
 
 /// Adds a sofa with a pillow, and the low table in front of it.
-fn add_seats(part: &mut Part, form: &Arc<Grid>) {
-    let bounds = Bounds { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
-    part.add(Shape::Field { distance: sofa, bounds, guide: form.clone() }, paint(paint::cloth, 0x8c4a52));
-    let cushion = Bounds { low: SOFA - Vec3::new(0.55, 0.2, 0.4), high: SOFA + Vec3::new(0.1, 0.25, 0.1) };
-    part.add(Shape::Field { distance: pillow, bounds: cushion, guide: form.clone() }, paint(paint::stripes, 0x35606b));
+fn add_seats(part: &mut Part, grid: &Arc<DistanceGrid>) {
+    let bounds = BoundingBox { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
+    part.add(
+        Shape::Field { distance: sofa_distance, bounds, guide: grid.clone() },
+        create_material(materials::shade_cloth, 0x8c4a52),
+    );
+    let cushion = BoundingBox { low: SOFA - Vec3::new(0.55, 0.2, 0.4), high: SOFA + Vec3::new(0.1, 0.25, 0.1) };
+    part.add(
+        Shape::Field { distance: pillow_distance, bounds: cushion, guide: grid.clone() },
+        create_material(materials::shade_stripes, 0x35606b),
+    );
     add_box(
         part,
         [TABLE.x - 0.62, TABLE.y - 0.03, TABLE.z - 0.55],
         [TABLE.x + 0.75, TABLE.y, TABLE.z + 0.55],
-        paint(paint::cloth, 0xcfc2a8),
+        create_material(materials::shade_cloth, 0xcfc2a8),
     );
     for (x, z) in [(-0.55, -0.48), (-0.55, 0.48), (0.6, 0.48)] {
         let leg = TABLE + Vec3::new(x, -0.03, z);
-        part.add_chain(&[(leg, 0.022), (Vec3::new(leg.x, FLOOR_Y, leg.z), 0.016)], paint(paint::plain, 0x4a2f1c));
+        part.add_chain(
+            &[(leg, 0.022), (Vec3::new(leg.x, FLOOR_Y, leg.z), 0.016)],
+            create_material(materials::shade_diffuse, 0x4a2f1c),
+        );
     }
     add_still_life(part);
 }
@@ -242,80 +273,80 @@ fn add_still_life(part: &mut Part) {
     for (x, z, height) in [(-0.36, -0.22, 0.07), (-0.22, -0.36, 0.05)] {
         let foot = TABLE + Vec3::new(x, 0.0, z);
         let glass = Shape::Frustum { base: foot, height, low_radius: 0.030, high_radius: 0.034 };
-        part.add(glass, Material::new(paint::lamp_shade, Vec3::new(0.9, 0.34, 0.10)));
+        part.add(glass, Material::new(materials::shade_lamp_shade, Vec3::new(0.9, 0.34, 0.10)));
         let flame = foot + (height + 0.006) * Vec3::Y;
         part.add(
             Shape::ellipsoid(flame, Mat3::IDENTITY, Vec3::new(0.0075, 0.017, 0.0075)),
-            Material::new(paint::glow, 11.0 * Vec3::new(1.0, 0.60, 0.22)),
+            Material::new(materials::shade_emissive, 11.0 * Vec3::new(1.0, 0.60, 0.22)),
         );
     }
     let foot = TABLE + Vec3::new(0.10, 0.0, 0.05);
     part.add(
         Shape::ellipsoid(foot + 0.085 * Vec3::Y, Mat3::IDENTITY, Vec3::new(0.062, 0.09, 0.062)),
-        paint(paint::ceramic, 0xd9cdb8),
+        create_material(materials::shade_ceramic, 0xd9cdb8),
     );
-    let mut dice = Dice::new(77);
+    let mut rng = Rng::new(77);
     for _ in 0..7 {
-        let lean = 0.45 * dice.direction() * Vec3::new(1.0, 0.0, 1.0);
+        let lean = 0.45 * rng.direction() * Vec3::new(1.0, 0.0, 1.0);
         let from = foot + 0.16 * Vec3::Y;
         let stem: Vec<_> = (0..=6)
             .map(|i| i as f32 / 6.0)
             .map(|s| (from + 0.34 * s * (Vec3::Y + lean * s), 0.0032 - 0.0015 * s))
             .collect();
-        part.add_chain(&stem, paint(paint::plain, 0x5c4a2c));
+        part.add_chain(&stem, create_material(materials::shade_diffuse, 0x5c4a2c));
         for (on, _) in &stem[2..] {
-            let bud = *on + 0.018 * dice.direction();
-            let color = hex(0xe9c3b0).lerp(hex(0xd98a86), dice.next());
+            let bud = *on + 0.018 * rng.direction();
+            let color = linear_from_hex(0xe9c3b0).lerp(linear_from_hex(0xd98a86), rng.next());
             part.add(
-                Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) },
-                Material::new(paint::cloth, color),
+                Shape::Sphere { centre: bud, radius: rng.between(0.010, 0.019) },
+                Material::new(materials::shade_cloth, color),
             );
         }
     }
     for (x, y, z) in [(0.34, 0.035, -0.2), (0.405, 0.035, -0.165), (0.345, 0.035, -0.13), (0.365, 0.088, -0.165)] {
         let orange = Shape::Sphere { centre: TABLE + Vec3::new(x, y, z), radius: 0.037 };
-        part.add(orange, paint(paint::ceramic, 0xdd8026));
+        part.add(orange, create_material(materials::shade_ceramic, 0xdd8026));
     }
 }
 
 /// Returns the signed distance to the sofa: back, seat and two arms.
-fn sofa(p: Vec3) -> f32 {
+fn sofa_distance(p: Vec3) -> f32 {
     let q = p - SOFA;
-    let back = brick(q - Vec3::new(0.0, -0.12, 0.26), Vec3::new(0.62, 0.26, 0.10), 0.09);
-    let seat = brick(q - Vec3::new(0.0, -0.36, -0.02), Vec3::new(0.60, 0.10, 0.32), 0.06);
+    let back = rounded_box(q - Vec3::new(0.0, -0.12, 0.26), Vec3::new(0.62, 0.26, 0.10), 0.09);
+    let seat = rounded_box(q - Vec3::new(0.0, -0.36, -0.02), Vec3::new(0.60, 0.10, 0.32), 0.06);
     let side = Vec3::new(q.x.abs() - 0.62, q.y + 0.26, q.z - 0.02);
-    blend(back, seat, 0.03).min(brick(side, Vec3::new(0.085, 0.21, 0.33), 0.08))
+    smooth_union(back, seat, 0.03).min(rounded_box(side, Vec3::new(0.085, 0.21, 0.33), 0.08))
 }
 
 /// Returns the signed distance to a rotated pillow, thinner towards its edges (scaled, as it is not an exact distance).
-fn pillow(p: Vec3) -> f32 {
+fn pillow_distance(p: Vec3) -> f32 {
     let q = Mat3::from_rotation_x(0.35) * Mat3::from_rotation_z(-0.2) * (p - SOFA - Vec3::new(-0.16, -0.07, 0.04));
     let edge = (q.x / 0.19).powi(2).max((q.y / 0.19).powi(2)).min(1.0);
-    brick(q, Vec3::new(0.19, 0.19, 0.075 - 0.045 * edge), 0.03) * 0.8
+    rounded_box(q, Vec3::new(0.19, 0.19, 0.075 - 0.045 * edge), 0.03) * 0.8
 }
 
 /// Returns the signed distance to the large objects of the room, for shadow and occlusion; also the guide of sofa and
 /// pillow.
-fn form(p: Vec3) -> f32 {
+fn room_distance(p: Vec3) -> f32 {
     let wall = WALL_M - p.z;
     let (low, high) = WINDOW;
-    let window = brick(
+    let window = rounded_box(
         p - Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), WALL_M),
         Vec3::new(0.5 * (high.x - low.x), 0.5 * (high.y - low.y), 0.3),
         0.0,
     );
     let board = |y: f32, from: f32| {
         let half = 0.5 * (2.16 - from);
-        brick(p - Vec3::new(from + half, y - 0.016, 4.07), Vec3::new(half, 0.016, 0.14), 0.0)
+        rounded_box(p - Vec3::new(from + half, y - 0.016, 4.07), Vec3::new(half, 0.016, 0.14), 0.0)
     };
-    let side = brick(p - Vec3::new(1.46, -0.69, 3.96), Vec3::new(0.83, 0.27, 0.25), 0.0);
-    let table = brick(p - TABLE - Vec3::new(0.065, -0.015, 0.0), Vec3::new(0.685, 0.015, 0.55), 0.0);
+    let side = rounded_box(p - Vec3::new(1.46, -0.69, 3.96), Vec3::new(0.83, 0.27, 0.25), 0.0);
+    let table = rounded_box(p - TABLE - Vec3::new(0.065, -0.015, 0.0), Vec3::new(0.685, 0.015, 0.55), 0.0);
     wall.max(-window)
         .min(p.y - FLOOR_Y)
         .min(board(0.20, 0.66))
         .min(board(0.66, 0.84))
         .min(side)
         .min(table)
-        .min(sofa(p))
-        .min(pillow(p))
+        .min(sofa_distance(p))
+        .min(pillow_distance(p))
 }

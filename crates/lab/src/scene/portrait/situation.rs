@@ -2,9 +2,9 @@
 
 use glam::{Mat3, Vec3};
 
-use super::form::hex;
-use super::paint;
-use super::{HEAD, head, nod, torso};
+use super::materials;
+use super::sdf::linear_from_hex;
+use super::{HEAD, head, nod_pose, torso};
 use crate::scene::light::Light;
 use crate::scene::part::{Material, Part};
 use crate::scene::ray::Pose;
@@ -48,26 +48,26 @@ impl Situation {
     }
 
     /// Returns the parts that belong to the person.
-    pub(super) fn own(self) -> Vec<Part> {
+    pub(super) fn worn_parts(self) -> Vec<Part> {
         match self {
-            Self::Headset => vec![headset()],
-            Self::Hand => vec![hand()],
-            Self::Mug => vec![mug()],
+            Self::Headset => vec![create_headset()],
+            Self::Hand => vec![create_hand()],
+            Self::Mug => vec![create_mug()],
             Self::Sits | Self::Chair | Self::Visitor | Self::Lamp => Vec::new(),
         }
     }
 
     /// Returns the parts that come and go with the person, but are not part of them.
-    pub(super) fn others(self) -> Vec<Part> {
+    pub(super) fn other_people(self) -> Vec<Part> {
         match self {
-            Self::Visitor => vec![head::part(visitor_pose), torso::part(visitor_pose)],
+            Self::Visitor => vec![head::create_part(visitor_pose), torso::create_part(visitor_pose)],
             _ => Vec::new(),
         }
     }
 
     /// Returns the parts that are also in the empty room.
     pub(super) fn furniture(self) -> Vec<Part> {
-        if self == Self::Chair { vec![chair()] } else { Vec::new() }
+        if self == Self::Chair { vec![create_chair()] } else { Vec::new() }
     }
 
     /// Returns the additional lights while the person is present.
@@ -76,7 +76,7 @@ impl Situation {
             position: Vec3::new(-1.1, 0.9, 3.4),
             power: Vec3::new(1.5, 1.15, 0.75),
             softness: 0.25,
-            casts_within_m: 0.0,
+            self_shadow_range_m: 0.0,
         };
         if self == Self::Lamp { vec![lamp] } else { Vec::new() }
     }
@@ -86,9 +86,9 @@ const SKIN: u32 = 0xe3ab8c;
 const WOOL: u32 = 0xd99a2b;
 
 /// Creates a headset of two cups, a bow over the hair and a microphone on an arm, in the frame of the head.
-fn headset() -> Part {
-    let mut part = Part::moving(nod);
-    let dark = Material::new(paint::metal, hex(0x202226));
+fn create_headset() -> Part {
+    let mut part = Part::new_moving(nod_pose);
+    let dark = Material::new(materials::shade_metal, linear_from_hex(0x202226));
     let bow: Vec<_> = (0..=20)
         .map(|k| {
             let angle = std::f32::consts::PI * k as f32 / 20.0;
@@ -107,9 +107,12 @@ fn headset() -> Part {
 }
 
 /// Creates a lower arm with an open hand beside the face, slightly nearer than the face.
-fn hand() -> Part {
-    let mut part = Part::still();
-    let (wool, skin) = (Material::new(paint::cloth, hex(WOOL)), Material::new(paint::plain, hex(SKIN)));
+fn create_hand() -> Part {
+    let mut part = Part::new_static();
+    let (wool, skin) = (
+        Material::new(materials::shade_cloth, linear_from_hex(WOOL)),
+        Material::new(materials::shade_diffuse, linear_from_hex(SKIN)),
+    );
     let wrist = Vec3::new(0.245, -0.075, 1.09);
     part.add_chain(&[(Vec3::new(0.30, -0.42, 1.2), 0.052), (wrist - 0.02 * Vec3::Y, 0.037)], wool);
     let palm = wrist + Vec3::new(0.0, 0.06, -0.01);
@@ -127,11 +130,14 @@ fn hand() -> Part {
 }
 
 /// Creates a mug in a hand, held out towards the camera.
-fn mug() -> Part {
-    let mut part = Part::still();
-    let (wool, skin) = (Material::new(paint::cloth, hex(WOOL)), Material::new(paint::plain, hex(SKIN)));
+fn create_mug() -> Part {
+    let mut part = Part::new_static();
+    let (wool, skin) = (
+        Material::new(materials::shade_cloth, linear_from_hex(WOOL)),
+        Material::new(materials::shade_diffuse, linear_from_hex(SKIN)),
+    );
     let at = Vec3::new(-0.115, -0.155, 0.8);
-    let mug = Material::new(paint::ceramic, hex(0x2f6f93));
+    let mug = Material::new(materials::shade_ceramic, linear_from_hex(0x2f6f93));
     part.add(Shape::Frustum { base: at, height: 0.095, low_radius: 0.038, high_radius: 0.041 }, mug);
     part.add(Shape::ellipsoid(at + 0.002 * Vec3::Y, Mat3::IDENTITY, Vec3::new(0.038, 0.006, 0.038)), mug);
     part.add_chain(&[(Vec3::new(-0.25, -0.47, 1.2), 0.052), (at + Vec3::new(-0.05, -0.02, 0.1), 0.036)], wool);
@@ -145,9 +151,9 @@ fn mug() -> Part {
 }
 
 /// Creates the back of an office chair, a hand's breadth behind the person.
-fn chair() -> Part {
-    let mut part = Part::still();
-    let dark = Material::new(paint::cloth, hex(0x25282c));
+fn create_chair() -> Part {
+    let mut part = Part::new_static();
+    let dark = Material::new(materials::shade_cloth, linear_from_hex(0x25282c));
     let axes = Mat3::from_rotation_y(0.25);
     let centre = Vec3::new(HEAD.x + 0.02, -0.2, 1.52);
     part.add(Shape::Cuboid { centre, axes, half: Vec3::new(0.27, 0.24, 0.02) }, dark);
@@ -158,5 +164,5 @@ fn chair() -> Part {
 
 /// Returns the pose of the other person.
 fn visitor_pose(_: f32) -> Pose {
-    Pose { turn: Mat3::from_rotation_y(-0.3), place: Vec3::new(-0.80, 0.12, 2.85) }
+    Pose { rotation: Mat3::from_rotation_y(-0.3), translation: Vec3::new(-0.80, 0.12, 2.85) }
 }

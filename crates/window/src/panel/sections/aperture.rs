@@ -6,8 +6,8 @@ use egui::{
 use egui::{Role, WidgetInfo, pos2};
 
 use super::Sheet;
-use crate::panel::parts::{Group, Hinted, Number, number};
 use crate::panel::theme::Colors;
+use crate::panel::widgets::{Number, RadioGroup, Tooltip, add_number};
 use crate::texts::tr;
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 
@@ -30,14 +30,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
     let mut shape = sheet.look.aperture.shape.clone();
     let changed = match &mut shape {
         Shape::Disc | Shape::Heart | Shape::Picture(_) => false,
-        Shape::Ring { inner } => number(ui, &Number::new("Hole", "Its radius", 0.0..=0.95, 2), inner),
+        Shape::Ring { inner } => add_number(ui, &Number::new("Hole", "Its radius", 0.0..=0.95, 2), inner),
         Shape::Polygon { blades, rotation_deg, curvature } => {
-            let turn = Number::new("Rotation", "Clockwise", -180.0..=180.0, 0).unit("", "°");
+            let turn = Number::new("Rotation", "Clockwise", -180.0..=180.0, 0).with_affixes("", "°");
             let curve = Number::new("Curvature", "From straight blades to a circle", 0.0..=1.0, 2);
             // `|` instead of `||`, so that every number is drawn.
-            integer(ui, "Blades", blades) | number(ui, &turn, rotation_deg) | number(ui, &curve, curvature)
+            add_integer(ui, "Blades", blades) | add_number(ui, &turn, rotation_deg) | add_number(ui, &curve, curvature)
         }
-        Shape::Star { points } => integer(ui, "Points", points),
+        Shape::Star { points } => add_integer(ui, "Points", points),
     };
     if changed {
         sheet.look.aperture.shape = shape;
@@ -46,18 +46,18 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
     let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
     let (intensity, rim, highlights) = (sheet.look.aperture.intensity, sheet.look.rim, sheet.look.highlights);
     let how = Number::new("Bubble to soft", hint, -1.0..=1.0, 2);
-    sheet.number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
+    sheet.add_number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
     let how = Number::new("Soft edge", "As a share of the radius", 0.0..=1.0, 2);
-    sheet.number(ui, &how, rim, |look, rim| look.rim = rim);
+    sheet.add_number(ui, &how, rim, |look, rim| look.rim = rim);
     let hint = "Brightness of lights, as a multiple of white; 0 is off";
-    let how = Number::new("Brighter lights", hint, 0.0..=50.0, 1).unit("", "×");
-    sheet.number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
+    let how = Number::new("Brighter lights", hint, 0.0..=50.0, 1).with_affixes("", "×");
+    sheet.add_number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
 
 /// Adds an integer number of blades or points. Returns whether it changed.
-fn integer(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
+fn add_integer(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
     let mut real = *value as f32;
-    let changed = number(ui, &Number::new(label, "How many", 3.0..=16.0, 0), &mut real);
+    let changed = add_number(ui, &Number::new(label, "How many", 3.0..=16.0, 0), &mut real);
     *value = real.round() as u32;
     changed
 }
@@ -66,7 +66,7 @@ fn integer(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
 fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
     let chosen = index_of(&sheet.look.aperture.shape);
     let no_drag = !ui.input(|input| input.pointer.any_down());
-    let mut shapes = Group::default();
+    let mut shapes = RadioGroup::default();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = Vec2::splat(4.0);
         for (index, name) in SHAPES.into_iter().enumerate() {
@@ -78,10 +78,10 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
             // Rendering thumbnails is slow: during a drag, only the selected shape's is updated.
             let texture = thumbnails.get_or_render(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
             draw_thumbnail(ui, rect, texture, is_chosen, response.hovered());
-            shapes.add(response.hint(name), aperture);
+            shapes.add(response.tooltip(name), aperture);
         }
     });
-    if let Some(aperture) = shapes.chosen(ui) {
+    if let Some(aperture) = shapes.selection(ui) {
         sheet.look.aperture = aperture;
         sheet.mark_changed(true, "shape");
     }
@@ -89,7 +89,7 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
 
 /// Draws a thumbnail, highlighted while it is selected or hovered.
 fn draw_thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     let painter = ui.painter();
     painter.rect_filled(rect, CornerRadius::same(8), colors.fill(false, hovered));
     let light = if chosen { colors.accent } else { colors.text };

@@ -3,24 +3,24 @@
 use egui::{Role, Ui, WidgetInfo};
 
 use super::Sheet;
-use crate::panel::parts::{Hinted, Number, dropdown, path, remark, switch};
-use crate::services::Browse;
+use crate::panel::widgets::{Number, Tooltip, add_dropdown, add_path, add_remark, add_switch};
+use crate::services::PathKind;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::look::FramingZoom;
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum BackgroundKind {
     Blurred,
     Color,
     Picture,
 }
 
-const KINDS: [(&str, &str, Kind); 3] = [
-    ("Blurred", "The room, blurred", Kind::Blurred),
-    ("Colour", "One colour, or a green screen for programs that replace it", Kind::Color),
-    ("Picture", "Your own picture, as large as the frame", Kind::Picture),
+const KINDS: [(&str, &str, BackgroundKind); 3] = [
+    ("Blurred", "The room, blurred", BackgroundKind::Blurred),
+    ("Colour", "One colour, or a green screen for programs that replace it", BackgroundKind::Color),
+    ("Picture", "Your own picture, as large as the frame", BackgroundKind::Picture),
 ];
 /// Chroma-key green.
 const GREEN: [u8; 3] = [0, 177, 64];
@@ -30,11 +30,11 @@ const DEFAULT_ZOOM: f32 = 1.5;
 const MIN_ZOOM: f32 = 1.1;
 
 /// Adds the list of backgrounds.
-pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
+pub fn add_background_choice(ui: &mut Ui, sheet: &mut Sheet) {
     let kind = match sheet.look.background {
-        Background::Blur => Kind::Blurred,
-        Background::Color(_) => Kind::Color,
-        Background::Picture(_) => Kind::Picture,
+        Background::Blur => BackgroundKind::Blurred,
+        Background::Color(_) => BackgroundKind::Color,
+        Background::Picture(_) => BackgroundKind::Picture,
     };
     let named = match &sheet.state.first_look.background {
         Background::Picture(picture) => Some(Background::Picture(picture.clone())),
@@ -44,13 +44,13 @@ pub fn kinds(ui: &mut Ui, sheet: &mut Sheet) {
     let shown = tr_with("Background: {}", &[&shown]);
     let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
     let enabled = sheet.follows_depth();
-    let chosen = ui.add_enabled_ui(enabled, |ui| dropdown(ui, "Background", &shown, all, &kind)).inner;
+    let chosen = ui.add_enabled_ui(enabled, |ui| add_dropdown(ui, "Background", &shown, all, &kind)).inner;
     if let Some(chosen) = chosen {
         match (chosen, named) {
-            (Kind::Blurred, _) => sheet.look.background = Background::Blur,
-            (Kind::Color, _) => sheet.look.background = Background::Color(GREEN),
-            (Kind::Picture, Some(named)) => sheet.look.background = named,
-            (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
+            (BackgroundKind::Blurred, _) => sheet.look.background = Background::Blur,
+            (BackgroundKind::Color, _) => sheet.look.background = Background::Color(GREEN),
+            (BackgroundKind::Picture, Some(named)) => sheet.look.background = named,
+            (BackgroundKind::Picture, None) => sheet.push_action(Action::Browse(PathKind::Background)),
         }
         sheet.mark_changed(true, "behind");
     }
@@ -61,14 +61,19 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     match sheet.look.background.clone() {
         Background::Blur => {}
         Background::Picture(picture) => {
-            picture.file.iter().for_each(|file| path(ui, &file.display().to_string()));
-            sheet.button(ui, "Choose picture…", "Another picture of your own", Action::Browse(Browse::Behind));
+            picture.file.iter().for_each(|file| add_path(ui, &file.display().to_string()));
+            sheet.add_button(
+                ui,
+                "Choose picture…",
+                "Another picture of your own",
+                Action::Browse(PathKind::Background),
+            );
         }
         Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
-            if picker.hint("Another colour").changed() {
+            if picker.tooltip("Another colour").changed() {
                 sheet.look.background = Background::Color(color);
                 sheet.mark_changed(true, "colour behind");
             }
@@ -76,7 +81,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     }
     let zoom = sheet.look.follow.zoom();
     let hint = "Recordings and calls show a part of the picture, with the subject in the middle";
-    if switch(ui, "Follow the subject", hint, zoom.is_some()) {
+    if add_switch(ui, "Follow the subject", hint, zoom.is_some()) {
         sheet.look.follow = if zoom.is_some() { FramingZoom::OFF } else { FramingZoom::from_zoom(DEFAULT_ZOOM) };
         sheet.mark_changed(true, "follow");
     }
@@ -84,7 +89,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     if let Some(zoom) = zoom {
         let how =
             Number::new("Largest zoom", "Largest magnification of the subject", MIN_ZOOM..=FramingZoom::MAX_ZOOM, 1);
-        sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
-        remark(ui, "Recordings and calls show the part in the dashed line; this window shows the whole picture.");
+        sheet
+            .add_number(ui, &how.with_affixes("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
+        add_remark(ui, "Recordings and calls show the part in the dashed line; this window shows the whole picture.");
     }
 }

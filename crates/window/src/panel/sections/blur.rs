@@ -3,8 +3,10 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Number, choose, remark};
-use crate::state::tweak::{F_NUMBERS, LENS, amount, f_number_of, lens_fraction, lens_of};
+use crate::panel::widgets::{Number, add_choice, add_remark};
+use crate::state::tweak::{
+    DEFAULT_LENS, F_NUMBER_RANGE, coc_fraction, f_number_for_coc, lens_coc_fraction, lens_for_look,
+};
 use crate::texts::tr_with;
 use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
 use bokehcam::optics::Lens;
@@ -20,12 +22,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let follows_depth = sheet.follows_depth();
     let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
     if (follows_depth || by_lens) && !sheet.is_relative() {
-        let chosen = choose(ui, "Blur by", &MODES, by_lens, |by_lens| !by_lens || follows_depth);
-        let focus_m = sheet.state.distance_m();
+        let chosen = add_choice(ui, "Blur by", &MODES, by_lens, |by_lens| !by_lens || follows_depth);
+        let focus_m = sheet.state.focus_distance_m();
         match (chosen, sheet.look.strength) {
-            (Some(true), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
+            (Some(true), _) => sheet.look.strength = Strength::Lens(lens_for_look(&sheet.look, focus_m, sheet.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = Strength::from_fraction(lens_fraction(lens, focus_m, sheet.size));
+                sheet.look.strength = Strength::from_fraction(lens_coc_fraction(lens, focus_m, sheet.size));
             }
             _ => {}
         }
@@ -39,19 +41,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// Adds the strength as a percentage, with a comparable lens.
 fn amount_number(ui: &mut Ui, sheet: &mut Sheet) {
-    let Some(fraction) = amount(&sheet.look, sheet.size.1) else { return };
+    let Some(fraction) = coc_fraction(&sheet.look, sheet.size.1) else { return };
     let hint = "Radius of a far light, relative to the picture's height. The wheel over the picture does the same";
-    let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).unit("", " %");
-    sheet.number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
+    let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).with_affixes("", " %");
+    sheet.add_number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
     if sheet.follows_depth() && sheet.state.focus_m.is_some() && !sheet.is_relative() {
-        remark(ui, &equivalent_lens(sheet));
+        add_remark(ui, &equivalent_lens(sheet));
     }
 }
 
-/// Returns a text with the f-number at which [`LENS`] would blur equally at the current focus distance.
+/// Returns a text with the f-number at which [`DEFAULT_LENS`] would blur equally at the current focus distance.
 fn equivalent_lens(sheet: &Sheet) -> String {
-    let fraction = amount(&sheet.look, sheet.size.1).unwrap_or_default();
-    let (f_number, focal_mm) = (f_number_of(fraction, sheet.state.distance_m(), sheet.size), LENS.focal_length_mm);
+    let fraction = coc_fraction(&sheet.look, sheet.size.1).unwrap_or_default();
+    let (f_number, focal_mm) =
+        (f_number_for_coc(fraction, sheet.state.focus_distance_m(), sheet.size), DEFAULT_LENS.focal_length_mm);
     if f_number.is_finite() && f_number < 64.0 {
         tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format!("{f_number:.1}")])
     } else {
@@ -61,15 +64,20 @@ fn equivalent_lens(sheet: &Sheet) -> String {
 
 /// Adds the lens parameters.
 fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, lens: Lens) {
-    let how = Number::new("Aperture", "f-number: smaller means more blur", F_NUMBERS, 1).unit("f/", "").logarithmic();
-    sheet.number(ui, &how, lens.f_number, |look, f_number| look.strength = Strength::Lens(Lens { f_number, ..lens }));
-    let how = Number::new("Focal length", "Longer means more blur", 14.0..=200.0, 0).unit("", " mm").logarithmic();
-    sheet.number(ui, &how, lens.focal_length_mm, |look, focal_length_mm| {
+    let how = Number::new("Aperture", "f-number: smaller means more blur", F_NUMBER_RANGE, 1)
+        .with_affixes("f/", "")
+        .logarithmic();
+    sheet.add_number(ui, &how, lens.f_number, |look, f_number| {
+        look.strength = Strength::Lens(Lens { f_number, ..lens })
+    });
+    let how =
+        Number::new("Focal length", "Longer means more blur", 14.0..=200.0, 0).with_affixes("", " mm").logarithmic();
+    sheet.add_number(ui, &how, lens.focal_length_mm, |look, focal_length_mm| {
         look.strength = Strength::Lens(Lens { focal_length_mm, ..lens });
     });
     let hint = "36 mm is full frame; smaller means more blur";
-    let how = Number::new("Sensor width", hint, 4.0..=54.0, 1).unit("", " mm").logarithmic();
-    sheet.number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
+    let how = Number::new("Sensor width", hint, 4.0..=54.0, 1).with_affixes("", " mm").logarithmic();
+    sheet.add_number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
         look.strength = Strength::Lens(Lens { sensor_width_mm, ..lens });
     });
 }

@@ -4,7 +4,7 @@ use egui::{Align, Button, Layout, Role, Sense, Slider, TextStyle, Ui, Vec2, Widg
 
 use super::{Sheet, backdrop};
 use crate::panel::dock::{CELL, CELL_GAP, CELLS};
-use crate::panel::parts::{Hinted, dropdown, switch};
+use crate::panel::widgets::{Tooltip, add_dropdown, add_switch};
 use crate::panel::{icons, theme::Colors};
 use crate::state::{Action, tweak};
 use crate::texts::{tr, tr_with};
@@ -16,7 +16,15 @@ pub const MORE: &str = "More";
 /// Draws the controls in `columns` columns.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
     let width = ((ui.available_width() - CELL_GAP * (columns - 1) as f32) / columns as f32).max(20.0);
-    let cells: [fn(&mut Ui, &mut Sheet); CELLS] = [camera, portrait, blur, backdrop::kinds, keep, calls, more];
+    let cells: [fn(&mut Ui, &mut Sheet); CELLS] = [
+        add_source_list,
+        add_portrait_switch,
+        add_blur_slider,
+        backdrop::add_background_choice,
+        add_save_buttons,
+        add_virtual_camera_switch,
+        add_more_button,
+    ];
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = Vec2::splat(CELL_GAP);
         for row in cells.chunks(columns) {
@@ -36,30 +44,30 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
 }
 
 /// Adds the list of sources.
-fn camera(ui: &mut Ui, sheet: &mut Sheet) {
+fn add_source_list(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let shown = match state.title() {
         "" => tr("the first camera"),
         title => title,
     };
     let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
-    if let Some(name) = dropdown(ui, "Camera", shown, sources, &&state.source_name[..]) {
-        sheet.act(Action::Open(name.to_owned()));
+    if let Some(name) = add_dropdown(ui, "Camera", shown, sources, &&state.source_name[..]) {
+        sheet.push_action(Action::Open(name.to_owned()));
     }
 }
 
 /// Adds the switch for blur by depth.
-fn portrait(ui: &mut Ui, sheet: &mut Sheet) {
+fn add_portrait_switch(ui: &mut Ui, sheet: &mut Sheet) {
     let on = sheet.follows_depth() && sheet.has_depth();
     let hint = "More blur, the farther from the subject in focus";
-    if switch(ui, "Portrait", hint, on) {
-        sheet.act(Action::Portrait(!on));
+    if add_switch(ui, "Portrait", hint, on) {
+        sheet.push_action(Action::Portrait(!on));
     }
 }
 
 /// Adds the slider for the blur strength.
-fn blur(ui: &mut Ui, sheet: &mut Sheet) {
-    let focus_m = sheet.state.distance_m();
+fn add_blur_slider(ui: &mut Ui, sheet: &mut Sheet) {
+    let focus_m = sheet.state.focus_distance_m();
     let fraction = tweak::blur_fraction(&sheet.look, focus_m, sheet.size);
     let enabled = sheet.look.effect != Effect::None;
     ui.add_enabled_ui(enabled, |ui| {
@@ -69,7 +77,10 @@ fn blur(ui: &mut Ui, sheet: &mut Sheet) {
         let max_percent = MAX_COC_PER_HEIGHT * 100.0;
         let mut percent = (fraction * 100.0).min(max_percent);
         let slider = ui.add(Slider::new(&mut percent, 0.0..=max_percent).show_value(false)).labelled_by(name.id);
-        if slider.hint("How much the background is blurred. The mouse wheel over the picture does the same").changed() {
+        if slider
+            .tooltip("How much the background is blurred. The mouse wheel over the picture does the same")
+            .changed()
+        {
             tweak::set_blur_fraction(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
             sheet.mark_changed(true, "Amount of blur");
         }
@@ -77,26 +88,26 @@ fn blur(ui: &mut Ui, sheet: &mut Sheet) {
 }
 
 /// Adds the buttons for recordings and snapshots.
-fn keep(ui: &mut Ui, sheet: &mut Sheet) {
+fn add_save_buttons(ui: &mut Ui, sheet: &mut Sheet) {
     let recording = sheet.state.recording().is_some();
-    let snapshot = icons::SIDE + 18.0;
+    let snapshot = icons::ICON_SIZE + 18.0;
     let record = vec2((ui.available_width() - snapshot - CELL_GAP).max(10.0), CELL);
-    if record_button(ui, recording, record) {
-        sheet.act(Action::Record(!recording));
+    if add_record_button(ui, recording, record) {
+        sheet.push_action(Action::Record(!recording));
     }
     let (rect, response) = ui.allocate_exact_size(vec2(snapshot, CELL), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr("Snapshot")));
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     ui.painter().rect_filled(rect, 8, colors.fill(false, response.hovered()));
     icons::draw_camera(ui.painter(), rect.center(), colors.text);
-    if response.hint("Snapshot: save this picture (S)").clicked() {
-        sheet.act(Action::Snapshot);
+    if response.tooltip("Snapshot: save this picture (S)").clicked() {
+        sheet.push_action(Action::Snapshot);
     }
 }
 
 /// Adds the button that starts and stops a recording. Returns whether it was clicked.
-fn record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
-    let colors = Colors::here(ui);
+fn add_record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
+    let colors = Colors::for_ui(ui);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let text = tr(if on { "Stop recording" } else { "Record" });
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, on, text));
@@ -105,33 +116,33 @@ fn record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
         ui.painter().rect_stroke(rect, 8, egui::Stroke::new(1.5, colors.alarm), egui::StrokeKind::Inside);
     }
     let text = WidgetText::from(text).color(colors.text);
-    let room = (rect.width() - 40.0).max(10.0);
-    let name = text.into_galley(ui, Some(egui::TextWrapMode::Truncate), room, TextStyle::Button);
+    let max_width = (rect.width() - 40.0).max(10.0);
+    let name = text.into_galley(ui, Some(egui::TextWrapMode::Truncate), max_width, TextStyle::Button);
     let left = rect.center().x - (name.size().x + 22.0) / 2.0;
     icons::draw_record(ui.painter(), egui::pos2(left + 7.0, rect.center().y), on, colors.alarm);
     ui.painter().galley(egui::pos2(left + 22.0, rect.center().y - name.size().y / 2.0), name, colors.text);
-    response.hint("A video beside the window, until you stop it (V)").clicked()
+    response.tooltip("A video beside the window, until you stop it (V)").clicked()
 }
 
 /// Adds the switch for the virtual camera.
-fn calls(ui: &mut Ui, sheet: &mut Sheet) {
+fn add_virtual_camera_switch(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let current = state.virtual_camera();
     let hint = "Other programs see this picture as a camera's (O)";
-    if switch(ui, "Use in calls", hint, current.is_some()) {
+    if add_switch(ui, "Use in calls", hint, current.is_some()) {
         let first = state.virtual_cameras.first().map(|camera| camera.name.clone());
-        sheet.act(Action::VirtualCamera(if current.is_some() { None } else { first }));
+        sheet.push_action(Action::VirtualCamera(if current.is_some() { None } else { first }));
     }
 }
 
 /// Adds the button that expands the panel.
-fn more(ui: &mut Ui, sheet: &mut Sheet) {
-    let open = sheet.state.shows_more();
+fn add_more_button(ui: &mut Ui, sheet: &mut Sheet) {
+    let open = sheet.state.is_expanded();
     let text = tr_with(if open { "{} Less" } else { "{} More" }, &[&if open { "−" } else { "+" }]);
     let button = Button::new(text).truncate().min_size(vec2(ui.available_width(), CELL));
-    let button = ui.add(button).hint("All other settings");
+    let button = ui.add(button).tooltip("All other settings");
     button.widget_info(|| WidgetInfo::selected(Role::Button, true, open, tr(MORE)));
     if button.clicked() {
-        sheet.act(Action::Section(MORE, !open));
+        sheet.push_action(Action::Section(MORE, !open));
     }
 }

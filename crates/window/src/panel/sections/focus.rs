@@ -3,8 +3,8 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Number, remark};
-use crate::state::tweak::{DISTANCES_M, FOCUS_RANGES_M};
+use crate::panel::widgets::{Number, add_remark};
+use crate::state::tweak::{FOCUS_DISTANCE_RANGE_M, FOCUS_RANGE_LIMITS_M};
 use crate::texts::tr_with;
 use bokehcam::depth::focus::FocusRule;
 
@@ -12,7 +12,7 @@ use bokehcam::depth::focus::FocusRule;
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let focus = sheet.look.focus;
     // A default if no frame with depth has arrived yet.
-    let now_m = sheet.state.distance_m();
+    let now_m = sheet.state.focus_distance_m();
     let (is_point, metres) = match focus {
         FocusRule::Metres(metres) => (false, metres),
         FocusRule::Point { .. } | FocusRule::Track { .. } => (true, now_m),
@@ -30,23 +30,23 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     ];
     let in_metres = !sheet.is_relative();
     let rules = if in_metres { &rules[..] } else { &rules[..2] };
-    sheet.choose(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
+    sheet.add_choice(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
     if in_metres {
         let hint = "Distance of the focal plane. Move the slider to set it";
-        let how = Number::new("Distance", hint, DISTANCES_M, 2).unit("", " m").logarithmic();
-        sheet.number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
+        let how = Number::new("Distance", hint, FOCUS_DISTANCE_RANGE_M, 2).with_affixes("", " m").logarithmic();
+        sheet.add_number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
         // Displayed as half the range on either side of the focal plane.
-        let half_m = *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0;
+        let half_m = *FOCUS_RANGE_LIMITS_M.start() / 2.0..=*FOCUS_RANGE_LIMITS_M.end() / 2.0;
         let hint = "Range that stays as sharp as the focal plane, in front of it and behind";
-        let how = Number::new("Depth of the sharp range", hint, half_m, 2).unit("±", " m");
-        sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
+        let how = Number::new("Depth of the sharp range", hint, half_m, 2).with_affixes("±", " m");
+        sheet.add_number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
         let half_m = sheet.look.focus_range_m / 2.0;
         if half_m > 0.0 {
             let [from, to] = [(metres - half_m).max(0.0), metres + half_m].map(|metres| format!("{metres:.2}"));
-            remark(ui, &tr_with("Sharp from {} m to {} m", &[&from, &to]));
+            add_remark(ui, &tr_with("Sharp from {} m to {} m", &[&from, &to]));
         }
     }
     if is_point {
-        remark(ui, "Click on the picture to focus elsewhere; double-click on something to follow it.");
+        add_remark(ui, "Click on the picture to focus elsewhere; double-click on something to follow it.");
     }
 }

@@ -6,8 +6,8 @@ use egui::{
 };
 
 use super::Sheet;
-use crate::panel::parts::{Group, Hinted, button, remark, set_accessible_name};
-use crate::panel::theme::{Colors, medium};
+use crate::panel::theme::{Colors, medium_font};
+use crate::panel::widgets::{RadioGroup, Tooltip, add_button, add_remark, set_accessible_name};
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
 use bokehcam::look::Effect;
@@ -28,20 +28,20 @@ enum Dialog {
 
 /// The preset dialog, and the name that is being typed.
 #[derive(Debug, Default)]
-pub struct Editing {
+pub struct PresetEditor {
     dialog: Dialog,
     name: String,
     /// Whether the text field is new and must request the focus.
     needs_focus: bool,
 }
 
-impl Editing {
+impl PresetEditor {
     /// Whether a dialog is open that Esc cancels.
-    pub fn is_asking(&self) -> bool {
+    pub fn has_open_dialog(&self) -> bool {
         self.dialog != Dialog::Nothing
     }
 
-    fn begin(&mut self, ui: &Ui, dialog: Dialog, name: &str) {
+    fn open_dialog(&mut self, ui: &Ui, dialog: Dialog, name: &str) {
         *self = Self { dialog, name: name.to_owned(), needs_focus: true };
         // During this pass, the clicked button still has the focus.
         ui.ctx().request_repaint();
@@ -49,7 +49,7 @@ impl Editing {
 }
 
 /// Adds the presets, and the dialogs to save, rename and delete the user's own.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) {
     let state = sheet.state;
     // Each dialog returns its next state; the buttons above it take effect in the next pass.
     let current = std::mem::take(&mut editing.dialog);
@@ -57,47 +57,47 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
         ui.horizontal_wrapped(|ui| {
-            let (mut chips, lit) = (Group::default(), state.preset_in_use());
+            let (mut chips, in_use) = (RadioGroup::default(), state.preset_in_use());
             for (index, preset) in state.presets.iter().enumerate() {
                 let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
                 let possible = !needs_depth || sheet.has_depth();
-                chips.add(draw_chip(ui, index, preset, lit == Some(index), possible), preset);
+                chips.add(draw_chip(ui, index, preset, in_use == Some(index), possible), preset);
             }
-            if let Some(preset) = chips.chosen(ui) {
-                sheet.act(Action::Preset(preset.name.clone()));
+            if let Some(preset) = chips.selection(ui) {
+                sheet.push_action(Action::Preset(preset.name.clone()));
             }
-            if current != Dialog::Saving && button(ui, "Save as…", "Save this look under a name") {
+            if current != Dialog::Saving && add_button(ui, "Save as…", "Save this look under a name") {
                 next = Some(Dialog::Saving);
             }
             let has_own = state.presets.iter().any(|preset| preset.is_user_defined);
-            if has_own && button(ui, "Edit…", "Rename or delete looks of your own") {
+            if has_own && add_button(ui, "Edit…", "Rename or delete looks of your own") {
                 next = Some(if current == Dialog::Listing { Dialog::Nothing } else { Dialog::Listing });
             }
         });
     });
     editing.dialog = match current {
         Dialog::Nothing => Dialog::Nothing,
-        Dialog::Saving => save(ui, sheet, editing),
-        Dialog::Listing => list(ui, sheet, editing),
-        Dialog::Renaming(name) => rename(ui, sheet, editing, name),
-        Dialog::Deleting(name) => delete(ui, sheet, name),
+        Dialog::Saving => show_save_dialog(ui, sheet, editing),
+        Dialog::Listing => show_list_dialog(ui, sheet, editing),
+        Dialog::Renaming(name) => show_rename_dialog(ui, sheet, editing, name),
+        Dialog::Deleting(name) => show_delete_dialog(ui, sheet, name),
     };
     if let Some(next) = next {
-        editing.begin(ui, next, "");
+        editing.open_dialog(ui, next, "");
     }
 }
 
 /// Asks for the name of a new preset. An existing preset is replaced only by an explicit button press, not by Enter.
-fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Dialog {
+fn show_save_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) -> Dialog {
     let is_there =
         sheet.state.presets.iter().any(|preset| preset.is_user_defined && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
-    match name_field(ui, editing, verb, (by_enter, sheet.is_cancelled(ui))) {
-        Some(true) => sheet.act(Action::SavePreset(editing.name.trim().to_owned())),
+    match add_name_field(ui, editing, verb, (by_enter, sheet.is_cancelled(ui))) {
+        Some(true) => sheet.push_action(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
             if is_there {
-                remark(ui, "There is already a look of this name.");
+                add_remark(ui, "There is already a look of this name.");
             }
             return Dialog::Saving;
         }
@@ -106,7 +106,7 @@ fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Dialog {
 }
 
 /// Lists the user's presets with their actions.
-fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Dialog {
+fn show_list_dialog(ui: &mut Ui, sheet: &Sheet, editing: &mut PresetEditor) -> Dialog {
     for preset in sheet.state.presets.iter().filter(|preset| preset.is_user_defined) {
         let row = ui.horizontal(|ui| {
             let [rename, delete] = ["Rename", "Delete"].map(|verb| {
@@ -119,7 +119,7 @@ fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Dialog {
         });
         match row.inner {
             (true, _) => {
-                editing.begin(ui, Dialog::Nothing, &preset.name);
+                editing.open_dialog(ui, Dialog::Nothing, &preset.name);
                 return Dialog::Renaming(preset.name.clone());
             }
             (_, true) => return Dialog::Deleting(preset.name.clone()),
@@ -129,10 +129,10 @@ fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Dialog {
     if sheet.is_cancelled(ui) { Dialog::Nothing } else { Dialog::Listing }
 }
 
-fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) -> Dialog {
+fn show_rename_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor, old: String) -> Dialog {
     let new = editing.name.trim().to_owned();
-    match name_field(ui, editing, "Rename", (true, sheet.is_cancelled(ui))) {
-        Some(true) if new != old => sheet.act(Action::RenamePreset(old, new)),
+    match add_name_field(ui, editing, "Rename", (true, sheet.is_cancelled(ui))) {
+        Some(true) if new != old => sheet.push_action(Action::RenamePreset(old, new)),
         Some(_) => {}
         None => return Dialog::Renaming(old),
     }
@@ -140,12 +140,12 @@ fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) ->
 }
 
 /// Asks before deleting a preset, because this cannot be undone.
-fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
+fn show_delete_dialog(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
     ui.label(tr_with("Delete “{}” for good?", &[&name]));
     let (delete, keep) =
         ui.horizontal_wrapped(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
-        sheet.act(Action::DeletePreset(name));
+        sheet.push_action(Action::DeletePreset(name));
     } else if !keep && !sheet.is_cancelled(ui) {
         return Dialog::Deleting(name);
     }
@@ -153,7 +153,12 @@ fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
 }
 
 /// Adds a name field with buttons. Returns true if confirmed, false if cancelled, `None` while open.
-fn name_field(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, is_cancelled): (bool, bool)) -> Option<bool> {
+fn add_name_field(
+    ui: &mut Ui,
+    editing: &mut PresetEditor,
+    verb: &str,
+    (by_enter, is_cancelled): (bool, bool),
+) -> Option<bool> {
     ui.horizontal_wrapped(|ui| {
         let width = ui.available_width().min(140.0);
         let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(width).char_limit(40);
@@ -177,16 +182,16 @@ fn name_field(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, is_canc
 
 /// Draws a preset with the number of its key.
 fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     // Names of user presets are displayed verbatim.
-    let shown = if preset.is_user_defined { preset.name.clone() } else { capitalized(&preset.name) };
-    let text = colors.on_fill(chosen, possible);
+    let shown = if preset.is_user_defined { preset.name.clone() } else { capitalize(&preset.name) };
+    let text = colors.text_on_fill(chosen, possible);
     let number_color = if possible && !chosen { colors.weak } else { text };
-    let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium()), text);
+    let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium_font()), text);
     // The keys 1 to 9 select presets.
     let has_key = index < 9;
-    let room = if has_key { 14.0 } else { 0.0 };
-    let size = vec2((name.size().x + room + 20.0).min(ui.max_rect().width()), 28.0);
+    let key_width = if has_key { 14.0 } else { 0.0 };
+    let size = vec2((name.size().x + key_width + 20.0).min(ui.max_rect().width()), 28.0);
     let sense = if possible { Sense::click() } else { Sense::hover() };
     let (rect, response) = ui.allocate_exact_size(size, sense);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, possible, chosen, &preset.name));
@@ -197,15 +202,15 @@ fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible:
         let font = FontId::new(11.0, FontFamily::Proportional);
         painter.text(at, Align2::CENTER_CENTER, index + 1, font, number_color);
     }
-    painter.galley(rect.left_center() + vec2(10.0 + room, -name.size().y / 2.0), name, text);
-    response.hint(match (possible, preset.is_user_defined) {
+    painter.galley(rect.left_center() + vec2(10.0 + key_width, -name.size().y / 2.0), name, text);
+    response.tooltip(match (possible, preset.is_user_defined) {
         (false, _) => "needs depth, and this source has none",
         (true, true) => "your own look",
         (true, false) => "a ready-made look",
     })
 }
 
-fn capitalized(name: &str) -> String {
+fn capitalize(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

@@ -13,12 +13,12 @@ mod source;
 mod view;
 
 pub use aperture::Thumbnails;
-pub use looks::Editing;
+pub use looks::PresetEditor;
 
 use egui::{Key, Ui};
 
-use super::parts::{Number, button, choose, number, section, switch};
 use super::state::{Action, State};
+use super::widgets::{Number, add_button, add_choice, add_foldable_section, add_number, add_switch};
 use bokehcam::look::{Effect, Look};
 
 /// Data that the sections read and change while they are drawn.
@@ -43,20 +43,20 @@ impl Sheet<'_> {
         }
     }
 
-    fn act(&mut self, action: Action) {
+    fn push_action(&mut self, action: Action) {
         self.actions.push(action);
     }
 
     /// Adds a number of the look, which `set` writes; its label is the undo stroke.
-    fn number(&mut self, ui: &mut Ui, how: &Number<'static>, mut value: f32, set: impl FnOnce(&mut Look, f32)) {
-        if number(ui, how, &mut value) {
+    fn add_number(&mut self, ui: &mut Ui, how: &Number<'static>, mut value: f32, set: impl FnOnce(&mut Look, f32)) {
+        if add_number(ui, how, &mut value) {
             set(&mut self.look, value);
             self.stroke = Some(how.label());
         }
     }
 
     /// Adds radio buttons for a setting of the look, which `set` writes.
-    fn choose<T: PartialEq + Copy>(
+    fn add_choice<T: PartialEq + Copy>(
         &mut self,
         ui: &mut Ui,
         what: &'static str,
@@ -64,23 +64,23 @@ impl Sheet<'_> {
         chosen: T,
         set: impl FnOnce(&mut Look, T),
     ) {
-        if let Some(option) = choose(ui, what, options, chosen, |_| true).filter(|option| *option != chosen) {
+        if let Some(option) = add_choice(ui, what, options, chosen, |_| true).filter(|option| *option != chosen) {
             set(&mut self.look, option);
             self.stroke = Some(what);
         }
     }
 
     /// Adds a switch; a click triggers `act` with the new state.
-    fn switch(&mut self, ui: &mut Ui, label: &str, hint: &str, on: bool, act: impl FnOnce(bool) -> Action) {
-        if switch(ui, label, hint, on) {
-            self.act(act(!on));
+    fn add_switch(&mut self, ui: &mut Ui, label: &str, hint: &str, on: bool, act: impl FnOnce(bool) -> Action) {
+        if add_switch(ui, label, hint, on) {
+            self.push_action(act(!on));
         }
     }
 
     /// Adds a button that triggers `action`.
-    fn button(&mut self, ui: &mut Ui, text: &str, hint: &str, action: Action) {
-        if button(ui, text, hint) {
-            self.act(action);
+    fn add_button(&mut self, ui: &mut Ui, text: &str, hint: &str, action: Action) {
+        if add_button(ui, text, hint) {
+            self.push_action(action);
         }
     }
 
@@ -95,7 +95,7 @@ impl Sheet<'_> {
 
     /// Whether depth is relative, without metres.
     fn is_relative(&self) -> bool {
-        self.state.known().is_relative
+        self.state.source_depth().is_relative
     }
 
     fn follows_depth(&self) -> bool {
@@ -104,7 +104,7 @@ impl Sheet<'_> {
 }
 
 /// Draws the sections that apply to the look and the source, in the order look, input and output, window.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbnails: &mut Thumbnails) {
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor, thumbnails: &mut Thumbnails) {
     ui.add_space(4.0);
     looks::show(ui, sheet, editing);
     ui.add_space(2.0);
@@ -125,21 +125,21 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbnails: &
     add_section(ui, sheet, "Record and call", true, output::show);
     add_section(ui, sheet, "View", true, view::show);
     if !sheet.state.controls.is_empty() {
-        add_section(ui, sheet, "Controls of the camera", false, source::controls);
+        add_section(ui, sheet, "Controls of the camera", false, source::add_controls);
     }
     add_section(ui, sheet, "For experts", false, |ui, sheet| {
-        view::internals(ui, sheet);
+        view::add_internals(ui, sheet);
         if blurs {
             quality::show(ui, sheet);
         }
-        source::executor(ui, sheet);
+        source::add_executor(ui, sheet);
     });
 }
 
 /// Draws a section, folded as the user left it; `open` is the default.
 fn add_section(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
-    let open = sheet.state.habits.sections.get(name).copied().unwrap_or(open);
-    if section(ui, name, open, |ui| body(ui, sheet)) {
-        sheet.act(Action::Section(name, !open));
+    let open = sheet.state.preferences.sections.get(name).copied().unwrap_or(open);
+    if add_foldable_section(ui, name, open, |ui| body(ui, sheet)) {
+        sheet.push_action(Action::Section(name, !open));
     }
 }

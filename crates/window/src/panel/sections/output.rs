@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Hinted, dropdown, path, remark};
+use crate::panel::widgets::{Tooltip, add_dropdown, add_path, add_remark};
 use crate::state::{Action, NO_VIRTUAL_CAMERA};
 use crate::texts::tr;
 
@@ -11,26 +11,26 @@ use crate::texts::tr;
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     if let Some(output) = state.recording().filter(|output| !output.name.is_empty()) {
-        path(ui, &output.name);
+        add_path(ui, &output.name);
     }
-    sheet.switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
+    sheet.add_switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
     let hint = "No picture leaves this program, and the camera is off: others see a still card";
-    sheet.switch(ui, "Camera off", hint, state.off, Action::Off);
+    sheet.add_switch(ui, "Camera off", hint, state.off, Action::Off);
     let hint = "Also saves the picture before the blur and its depth: `render --like` makes the snapshot again";
-    sheet.switch(ui, "Reproducible snapshots", hint, state.habits.keep_sources, Action::KeepSources);
+    sheet.add_switch(ui, "Reproducible snapshots", hint, state.preferences.keep_sources, Action::KeepSources);
     ui.horizontal_wrapped(|ui| {
         let hint = "Copy the equivalent command line to the clipboard (K)";
-        sheet.button(ui, "Copy command", hint, Action::CopyCommand);
-        if let Some(folder) = &state.kept_in {
+        sheet.add_button(ui, "Copy command", hint, Action::CopyCommand);
+        if let Some(folder) = &state.saved_in {
             let open = ui.button(tr("Open folder")).on_hover_text(folder.display().to_string());
             if open.clicked() {
-                sheet.act(Action::OpenFolder);
+                sheet.push_action(Action::OpenFolder);
             }
         }
     });
-    ui.label(tr("Camera for calls")).hint("Other programs see the picture as a camera's (O)");
+    ui.label(tr("Camera for calls")).tooltip("Other programs see the picture as a camera's (O)");
     if state.virtual_cameras.is_empty() {
-        remark(ui, NO_VIRTUAL_CAMERA);
+        add_remark(ui, NO_VIRTUAL_CAMERA);
         return;
     }
     let current = state.virtual_camera().map(|output| output.name.as_str());
@@ -43,7 +43,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         .iter()
         .find(|camera| camera.2 == current)
         .map_or_else(|| current.unwrap_or_default().to_owned(), |camera| camera.0.clone());
-    if let Some(camera) = dropdown(ui, "Camera for calls", &shown, all, &current) {
-        sheet.act(Action::VirtualCamera(camera.map(str::to_owned)));
+    if let Some(camera) = add_dropdown(ui, "Camera for calls", &shown, all, &current) {
+        sheet.push_action(Action::VirtualCamera(camera.map(str::to_owned)));
     }
 }

@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::dropdown;
+use crate::panel::widgets::add_dropdown;
 use crate::texts::tr;
 use bokehcam::budget::Quality;
 
@@ -16,7 +16,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     ui.label(tr("Quality"));
     let quality = sheet.look.quality;
     let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
-    if let Some(quality) = dropdown(ui, "Quality", &name(quality), levels, &quality) {
+    if let Some(quality) = add_dropdown(ui, "Quality", &name(quality), levels, &quality) {
         sheet.look.quality = quality;
         sheet.mark_changed(true, "quality");
     }

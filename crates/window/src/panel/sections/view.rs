@@ -3,7 +3,7 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::panel::parts::{Number, choose, number, remark};
+use crate::panel::widgets::{Number, add_choice, add_number, add_remark};
 use crate::state::{Action, Shown};
 
 type Views = [(&'static str, &'static str, Shown); 2];
@@ -18,41 +18,41 @@ const INTERNALS: Views = [
 ];
 
 /// Adds radio buttons for views; clicking the active one returns to the picture.
-fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
+fn add_view_choice(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
     let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
-    if let Some(shown) = choose(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
-        sheet.act(Action::Show(if shown == now { Shown::Picture } else { shown }));
+    if let Some(shown) = add_choice(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
+        sheet.push_action(Action::Show(if shown == now { Shown::Picture } else { shown }));
     }
 }
 
 /// Adds the views of the blur's internals, and the instruments.
-pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
-    choose_view(ui, sheet, "Views of the blur", INTERNALS);
-    sheet.switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
+pub fn add_internals(ui: &mut Ui, sheet: &mut Sheet) {
+    add_view_choice(ui, sheet, "Views of the blur", INTERNALS);
+    sheet.add_switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
 }
 
 /// Adds the view, and options for its display.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
-    choose_view(ui, sheet, "Show", VIEWS);
+    add_view_choice(ui, sheet, "Show", VIEWS);
     let hint = "Like a mirror; recordings and calls are not mirrored (M)";
-    sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
+    sheet.add_switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {
-        remark(ui, "Only this window is mirrored, not recordings and calls.");
+        add_remark(ui, "Only this window is mirrored, not recordings and calls.");
     }
     let (freeze, hint) = match state.can_pause() {
         true => ("Pause", "Pause the recording, and try looks on its picture (Z)"),
         false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
     };
-    sheet.switch(ui, freeze, hint, state.frozen, Action::Freeze);
+    sheet.add_switch(ui, freeze, hint, state.frozen, Action::Freeze);
     let hint = "Show the picture before the blur, left of a movable line (B)";
-    sheet.switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
+    sheet.add_switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
     if let Some(at) = state.split {
         let hint = "From the left; you can also drag the line on the picture";
         let mut percent = at * 100.0;
-        if number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).unit("", " %"), &mut percent) {
-            sheet.act(Action::Split(Some(percent / 100.0)));
+        if add_number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).with_affixes("", " %"), &mut percent) {
+            sheet.push_action(Action::Split(Some(percent / 100.0)));
         }
     }
-    sheet.switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
+    sheet.add_switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
 }

@@ -46,7 +46,7 @@ impl Tree {
 #[test]
 fn every_control_has_a_name() {
     let mut lens = sample::state();
-    lens.look.strength = Strength::Lens(crate::state::tweak::LENS);
+    lens.look.strength = Strength::Lens(crate::state::tweak::DEFAULT_LENS);
     let mut tilt = sample::state();
     (tilt.look.effect, tilt.source) = (Effect::TiltShift, sample::running(false));
     for state in [sample::state(), lens, tilt] {

@@ -63,11 +63,11 @@ fn esc_leaves_a_plate_that_is_not_there_yet() {
     let mut state = sample::state();
     state.source = sample::running(false);
     let Source::Running(running) = &mut state.source else { unreachable!("it runs") };
-    running.ways = vec![DepthMethod::Person, DepthMethod::Plate];
+    running.depth_methods = vec![DepthMethod::Person, DepthMethod::Plate];
     state.plate = Some(Step::KeepsMoving);
     let mut window = Window::of(state, (1280, 720));
     assert!(window.place_of("Find me without it").is_some());
-    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::DepthBy(DepthMethod::Person)));
+    assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::SetDepthMethod(DepthMethod::Person)));
     assert!(window.state.panel, "the panel stays");
     window.state.plate = Some(Step::Ready);
     assert!(window.press(Key::Escape, Modifiers::NONE).contains(&Action::Panel(false)));
@@ -80,7 +80,10 @@ fn it_does_not_ask_who_said_so_nor_when_nothing_would_be_lost() {
     window.wait(0.2);
     window.click_on("Do not ask again");
     window.click_on("Keep recording");
-    assert!(!window.state.closing && window.state.habits.ask_before_closing, "who does not close has decided nothing");
+    assert!(
+        !window.state.closing && window.state.preferences.ask_before_closing,
+        "who does not close has decided nothing"
+    );
     window.state.apply(Action::Close);
     window.wait(0.2);
     // Enter activates the safe choice.
@@ -90,7 +93,7 @@ fn it_does_not_ask_who_said_so_nor_when_nothing_would_be_lost() {
     window.wait(0.2);
     window.click_on("Do not ask again");
     assert!(window.click_on("Stop and close").contains(&Action::Close));
-    assert!(!window.state.habits.ask_before_closing);
+    assert!(!window.state.preferences.ask_before_closing);
     let mut state = recording();
     state.apply(Action::Close);
     assert!(state.closing);
@@ -122,7 +125,7 @@ fn the_help_scrolls_by_keys_and_lets_nothing_through() {
 #[test]
 fn single_keys_can_be_switched_off() {
     let mut window = Window::new();
-    window.state.habits.single_keys = false;
+    window.state.preferences.single_keys = false;
     for (chord, keys) in
         GROUPS.iter().flat_map(|group| group.bindings).flat_map(|b| b.chords.iter().map(|c| (c, b.keys)))
     {
@@ -132,7 +135,7 @@ fn single_keys_can_be_switched_off() {
         let done = window.pass(vec![pressed(chord.key, modifiers, true)]);
         window.pass(vec![pressed(chord.key, modifiers, false)]);
         let is_sign = !chord.ctrl && chord.key.symbol_or_name().len() == 1;
-        assert!(!is_sign || done.iter().all(|action| *action == Action::Settle), "{keys}: {done:?}");
+        assert!(!is_sign || done.iter().all(|action| *action == Action::EndStroke), "{keys}: {done:?}");
     }
     assert!(window.press(Key::F1, Modifiers::NONE).contains(&Action::Help(true)));
 }

@@ -6,7 +6,7 @@ use egui::accesskit::{Action as Told, Node, NodeId};
 use egui::{Key, Modifiers, Rect, Role, pos2};
 
 use super::{Action, Window, sample};
-use crate::panel::dock::{Dock, room};
+use crate::panel::dock::{Dock, picture_area};
 use crate::state::{DepthMethod, Output, Source, State};
 use crate::texts;
 use bokehcam::look::Effect;
@@ -69,13 +69,13 @@ fn they_do_what_they_say() {
     assert_eq!(window.click_on("Use in calls"), [Action::VirtualCamera(Some("/dev/video9".into()))]);
     assert_eq!(window.click_on("Use in calls"), [Action::VirtualCamera(None)]);
     window.click_on("+ More");
-    assert!(window.state.shows_more() && window.place_of("Save as…").is_some());
+    assert!(window.state.is_expanded() && window.place_of("Save as…").is_some());
     window.click_on("− Less");
     assert!(window.place_of("Save as…").is_none());
     let before = window.state.look.clone();
     let slider = controls(&mut window).into_iter().find(|(role, ..)| *role == Role::Slider).unwrap().2;
     window.drag(slider.center(), slider.right_center());
-    let amount = |look| crate::state::tweak::amount(look, 720).unwrap();
+    let amount = |look| crate::state::tweak::coc_fraction(look, 720).unwrap();
     assert!(amount(&window.state.look) > 1.5 * amount(&before));
 }
 
@@ -84,15 +84,15 @@ fn without_depth_the_switch_asks_how_it_may_be_known() {
     let mut state = first();
     state.apply_update(crate::state::Update::Source(sample::running(false)));
     assert_eq!(state.look.effect, Effect::Blur, "nobody knows whom to keep sharp");
-    state.declined_plate = true;
+    state.depth_offer_declined = true;
     let mut window = Window::of(state, (1280, 720));
     window.click_on("Portrait");
-    assert_eq!((window.state.look.effect, window.state.offers_depth()), (Effect::Blur, true));
+    assert_eq!((window.state.look.effect, window.state.offers_depth_methods()), (Effect::Blur, true));
     window.wait(0.1);
-    assert_eq!(window.click_on("Find me with a small network"), [Action::FindMe]);
-    assert_eq!(window.click_on("Show me the empty room"), [Action::TakePlate]);
+    assert_eq!(window.click_on("Find me with a small network"), [Action::SegmentPerson]);
+    assert_eq!(window.click_on("Show me the empty room"), [Action::CapturePlate]);
     window.press(Key::Escape, Modifiers::NONE);
-    assert!(window.state.declined_plate && window.state.panel, "Esc closes the question alone");
+    assert!(window.state.depth_offer_declined && window.state.panel, "Esc closes the question alone");
 }
 
 #[test]
@@ -101,19 +101,22 @@ fn the_panel_is_never_on_the_picture() {
         for picture in [(1280, 720), (640, 480), (720, 1280)] {
             for more in [false, true] {
                 let window = Rect::from_min_size(pos2(0.0, 0.0), egui::vec2(size.0 as f32, size.1 as f32));
-                let dock = Dock::of(window, picture, more);
-                assert!(window.contains_rect(dock.panel) && window.contains_rect(dock.room), "{size:?}: {dock:?}");
-                assert!(!dock.panel.intersects(dock.room), "{size:?}: {dock:?}");
-                assert!(dock.room.area() > 0.3 * window.area(), "{size:?}: {dock:?}");
+                let dock = Dock::new(window, picture, more);
+                assert!(
+                    window.contains_rect(dock.panel) && window.contains_rect(dock.picture_area),
+                    "{size:?}: {dock:?}"
+                );
+                assert!(!dock.panel.intersects(dock.picture_area), "{size:?}: {dock:?}");
+                assert!(dock.picture_area.area() > 0.3 * window.area(), "{size:?}: {dock:?}");
             }
         }
     }
     // Below in a tall window, beside in a wide one, without cost where the picture leaves room.
     let dock = |width: f32, height: f32, picture| {
-        Dock::of(Rect::from_min_size(pos2(0.0, 0.0), egui::vec2(width, height)), picture, false)
+        Dock::new(Rect::from_min_size(pos2(0.0, 0.0), egui::vec2(width, height)), picture, false)
     };
-    assert!(dock(500.0, 700.0, (1280, 720)).room.height() >= 500.0 * 9.0 / 16.0);
-    assert!(dock(1280.0, 720.0, (640, 480)).room.width() >= 960.0);
+    assert!(dock(500.0, 700.0, (1280, 720)).picture_area.height() >= 500.0 * 9.0 / 16.0);
+    assert!(dock(1280.0, 720.0, (640, 480)).picture_area.width() >= 960.0);
     assert_eq!((dock(1280.0, 720.0, (1280, 720)).columns, dock(500.0, 700.0, (1280, 720)).columns), (1, 2));
 }
 
@@ -124,10 +127,10 @@ fn messages_and_badges_are_in_the_pictures_room() {
         state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
         state.note("Saved ~/Pictures/bokehcam 2026-11-23 21-14-05.png");
         let mut window = Window::of(state, size);
-        let room = room(&window.ctx).expand(1.0);
+        let area = picture_area(&window.ctx).expand(1.0);
         for (text, at) in window.boxes() {
             if text.starts_with("Saved") || text.starts_with("Recording ") {
-                assert!(room.contains_rect(at), "{size:?}: {text} at {at} is not in {room}");
+                assert!(area.contains_rect(at), "{size:?}: {text} at {at} is not in {area}");
             }
         }
     }
@@ -135,12 +138,12 @@ fn messages_and_badges_are_in_the_pictures_room() {
 
 /// Returns the built-in German translation.
 fn german() -> texts::Table {
-    texts::built_in("de").expect("German")
+    texts::load_built_in("de").expect("German")
 }
 
 #[test]
 fn german_is_whole() {
-    let (english, german) = (texts::tests::english(), german());
+    let (english, german) = (texts::tests::english_table(), german());
     let missing: Vec<&String> = english.keys().filter(|text| german.get(*text).is_none_or(String::is_empty)).collect();
     assert!(missing.is_empty(), "not in German: {missing:#?}");
     let gone: Vec<&String> = german.keys().filter(|text| !english.contains_key(*text)).collect();
@@ -152,7 +155,7 @@ fn german_is_whole() {
 
 #[test]
 fn in_german_nothing_is_cut_off_at_any_size() {
-    texts::speak(german());
+    texts::set_translation(german());
     for size in WINDOWS {
         for more in [false, true] {
             let mut state = first();
@@ -161,14 +164,14 @@ fn in_german_nothing_is_cut_off_at_any_size() {
                 state.apply(Action::Section(section, true));
             }
             let Source::Running(running) = &mut state.source else { panic!("it runs") };
-            running.ways = vec![
+            running.depth_methods = vec![
                 DepthMethod::Measured,
                 DepthMethod::Stereo,
                 DepthMethod::Person,
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 DepthMethod::Plate,
             ];
-            state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
+            state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::DEFAULT_LENS);
             (state.mirror, state.split) = (true, Some(0.5));
             // As much as fits the panel's height.
             let mut window = Window::of(state, size);

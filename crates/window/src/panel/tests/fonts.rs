@@ -37,7 +37,7 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
     window.wait(0.2);
     assert!(receiver.try_recv().is_err(), "nothing is looked for before it is missed");
     let has = |window: &Window, sign: char| {
-        let families = [FontFamily::Proportional, super::super::theme::medium()];
+        let families = [FontFamily::Proportional, super::super::theme::medium_font()];
         window.ctx.fonts_mut(|fonts| families.map(|family| fonts.has_glyph(&FontId::new(13.0, family), sign)))
     };
     assert_eq!(has(&window, 'É'), [true; 2]);

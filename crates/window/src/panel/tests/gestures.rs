@@ -23,7 +23,7 @@ fn a_click_is_where_the_picture_is() {
     let mut window = Window::new();
     window.native = 2.0;
     window.canvas.area = Area { x: 100, y: 60, width: 800, height: 450 };
-    window.state.habits.text_scale = 1.25;
+    window.state.preferences.text_scale = 1.25;
     window.wait(0.2);
     let at = |x: f32, y: f32| pos2(x, y) / 2.5;
     assert!(close(point(&window.click(at(100.0 + 400.0, 60.0 + 90.0))), [0.5, 0.2]));
@@ -81,12 +81,12 @@ fn wheel(window: &mut Window, at: Pos2, delta: f32) -> Vec<Action> {
 #[test]
 fn the_wheel_blurs_more_and_less_over_the_picture_only() {
     let mut window = Window::new();
-    let amount = |window: &Window| crate::state::tweak::amount(&window.state.look, 720).unwrap();
+    let amount = |window: &Window| crate::state::tweak::coc_fraction(&window.state.look, 720).unwrap();
     let first = amount(&window);
     let actions = wheel(&mut window, pos2(400.0, 300.0), 100.0);
     let more = amount(&window);
     assert!(more > 1.1 * first && more < 1.6 * first, "{first} to {more}");
-    assert!(actions.contains(&Action::Settle), "the wheel came to rest");
+    assert!(actions.contains(&Action::EndStroke), "the wheel came to rest");
     wheel(&mut window, pos2(400.0, 300.0), -200.0);
     assert!(amount(&window) < first);
     let before = window.state.look.clone();

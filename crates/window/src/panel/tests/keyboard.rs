@@ -24,7 +24,7 @@ fn every_key_reaches_the_window() {
             let mut modifiers = if chord.ctrl { Modifiers::CTRL | Modifiers::COMMAND } else { Modifiers::NONE };
             modifiers.shift = chord.shift;
             let actions = window.press(chord.key, modifiers);
-            let done = actions.iter().any(|action| *action != Action::Settle);
+            let done = actions.iter().any(|action| *action != Action::EndStroke);
             // The panel's own key is pressed twice, so Esc then has nothing to close.
             assert!(done || chord.key == Key::Escape, "{group}: {} gave {actions:?}", binding.keys);
         }
@@ -74,7 +74,7 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
         done.extend(window.press(Key::Space, Modifiers::NONE));
         // Restores whatever closes or folds the panel, or can be undone.
         let state = &mut window.state;
-        (state.panel, state.help, state.habits) = (before.panel, before.help, before.habits);
+        (state.panel, state.help, state.preferences) = (before.panel, before.help, before.preferences);
         (state.history, state.look) = (before.history, before.look);
         window.pass(Vec::new());
         // Closing the panel removed the focus: restore it.
@@ -176,7 +176,7 @@ fn a_name_is_typed_whatever_way_it_is_asked_for_and_presses_no_keys() {
         }
         actions.extend(window.press(Key::Enter, Modifiers::NONE));
         actions.extend(window.wait(0.2));
-        let done: Vec<&Action> = actions.iter().filter(|action| **action != Action::Settle).collect();
+        let done: Vec<&Action> = actions.iter().filter(|action| **action != Action::EndStroke).collect();
         assert_eq!(done, [&Action::SavePreset("quiet".into())]);
     }
 }
@@ -187,7 +187,7 @@ fn what_is_written_is_always_seen_with_its_time() {
     window.state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
     window.pass(Vec::new());
     for bare in [false, true] {
-        window.state.bare = bare;
+        window.state.controls_hidden = bare;
         for _ in 0..2 {
             window.wait(30.5);
             assert!(window.texts().iter().any(|text| text.starts_with("Recording ")), "{:?}", window.texts());
@@ -195,7 +195,7 @@ fn what_is_written_is_always_seen_with_its_time() {
         }
     }
     assert!(window.texts().contains(&"Recording 2:02".to_owned()), "{:?}", window.texts());
-    (window.state.bare, window.state.panel) = (false, true);
+    (window.state.controls_hidden, window.state.panel) = (false, true);
     window.pass(vec![Event::PointerMoved(pos2(310.0, 300.0))]);
     window.wait(0.5);
     let (panel, badge) = (window.panel.sheet.rect().unwrap(), window.place_of("Recording 2:02").unwrap());
@@ -255,7 +255,7 @@ fn in_full_screen_the_panel_hides_itself_and_comes_back() {
     window.wait(20.0);
     assert!(is_seen(&window));
     let mut window = Window::new();
-    (window.panel.stays, window.state.full_screen) = (true, true);
+    (window.panel.is_always_visible, window.state.full_screen) = (true, true);
     window.wait(20.0);
     assert!(is_seen(&window), "a screen reader looks for it");
 }

@@ -63,7 +63,7 @@ impl Seen {
     fn save(&mut self, name: &str) {
         (0..30).for_each(|_| self.pass(Vec::new()));
         let whole = self.window.canvas.area;
-        let room = crate::panel::room_px(&self.window.ctx);
+        let room = crate::panel::picture_area_px(&self.window.ctx);
         let area = crate::present::fitted((1280, 720), room);
         let image = backdrop((area.width, area.height));
         let mut pixels = vec![0; (whole.width * whole.height) as usize];
@@ -91,8 +91,8 @@ fn pictures() {
     shot("dark", Theme::Dark, &|_| {});
     shot("light", Theme::Light, &|_| {});
     // The first screen, folded and expanded, in several window sizes and languages.
-    for (language, table) in [("en", None), ("de", crate::texts::built_in("de"))] {
-        table.into_iter().for_each(crate::texts::speak);
+    for (language, table) in [("en", None), ("de", crate::texts::load_built_in("de"))] {
+        table.into_iter().for_each(crate::texts::set_translation);
         for size in [(1280, 720), (500, 700), (480, 320)] {
             for (theme, called) in [(Theme::Dark, "dark"), (Theme::Light, "light")] {
                 for more in [false, true] {
@@ -106,7 +106,7 @@ fn pictures() {
             }
         }
     }
-    crate::texts::speak(crate::texts::Table::new());
+    crate::texts::set_translation(crate::texts::Table::new());
     shot("instruments", Theme::Dark, &|state| {
         state.instruments = true;
         state.meters.fill_with_samples();
@@ -131,8 +131,8 @@ fn pictures() {
         });
     }
     shot("large", Theme::Dark, &|state| {
-        state.habits.text_scale = 1.8;
-        state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::LENS);
+        state.preferences.text_scale = 1.8;
+        state.look.strength = bokehcam::look::Strength::Lens(crate::state::tweak::DEFAULT_LENS);
     });
     shot("help", Theme::Dark, &|state| state.help = true);
     shot("help-light", Theme::Light, &|state| state.help = true);
@@ -142,7 +142,7 @@ fn pictures() {
     for (name, theme) in [("recording", Theme::Dark), ("recording-light", Theme::Light)] {
         shot(name, theme, &|state| {
             let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
-            state.transport = Some(Transport { place: 280, frames: 738, time_ns, length_ns });
+            state.transport = Some(Transport { frame: 280, frames: 738, time_ns, length_ns });
             state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
             state.note("holiday.jpg: a photo, a single still frame, with the depth beside it");
         });
@@ -204,7 +204,7 @@ fn over(color: Color32, grey: u8) -> [f32; 3] {
 fn text_can_be_read_over_any_picture() {
     let solid = |color: Color32| over(color, 0);
     for theme in [Theme::Dark, Theme::Light] {
-        let colors = Colors::of(theme);
+        let colors = Colors::for_theme(theme);
         for picture in [0, 60, 128, 200, 255] {
             let card = over(colors.card, picture);
             let texts =

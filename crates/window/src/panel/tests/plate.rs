@@ -19,11 +19,11 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     }
     let declined = |state: &mut State| {
         let Source::Running(running) = &mut state.source else { panic!("it runs") };
-        running.ways.push(DepthMethod::Measured);
+        running.depth_methods.push(DepthMethod::Measured);
     };
     assert!(!texts(&declined).contains("Not now"), "it has depth, which was declined");
     texts(&|state| state.source = sample::running(false));
-    assert!(!texts(&|state| state.declined_plate = true).contains("Not now"));
+    assert!(!texts(&|state| state.depth_offer_declined = true).contains("Not now"));
     let out = texts(&|state| state.plate = Some(Step::StepOut(2)));
     assert!(out.contains("Step out of the picture") && out.contains('2'), "{out}");
     let unlike = texts(&|state| state.plate = Some(Step::Mismatched));
@@ -40,10 +40,10 @@ fn that_it_is_a_demonstration_is_said_until_it_is_known() {
     running.name = "demo".into();
     window.wait(60.0);
     assert!(says(&mut window));
-    window.state.bare = true;
+    window.state.controls_hidden = true;
     window.pass(Vec::new());
     assert!(!says(&mut window), "only the picture");
-    window.state.bare = false;
+    window.state.controls_hidden = false;
     window.wait(0.1);
     let look = window.state.look.clone();
     window.click_on("This is a demonstration");

@@ -5,7 +5,7 @@ use egui::{Event, Key, Modifiers};
 use super::{Action, Window, pressed};
 
 fn done(actions: Vec<Action>) -> Vec<Action> {
-    actions.into_iter().filter(|action| !matches!(action, Action::Settle)).collect()
+    actions.into_iter().filter(|action| !matches!(action, Action::EndStroke)).collect()
 }
 
 impl Window {
@@ -99,7 +99,7 @@ fn a_number_that_cannot_be_is_told() {
     window.click_on("0.00");
     window.type_over("70");
     window.enter();
-    assert_eq!(window.state.look.focus_range_m, 2.0 * 0.5 * *crate::state::tweak::FOCUS_RANGES_M.end());
+    assert_eq!(window.state.look.focus_range_m, 2.0 * 0.5 * *crate::state::tweak::FOCUS_RANGE_LIMITS_M.end());
     assert!(
         said(&window).iter().any(|line| line.starts_with("Depth of the sharp range is limited to ±0.00 m to ±")),
         "{:?}",

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Key, Modifiers, pos2};
 
 use super::{Action, Window, sample};
-use crate::services::Browse;
+use crate::services::PathKind;
 use crate::state::{Request, Shown, Source, State, Update};
 use bokehcam::depth::backdrop::{Background, BackgroundPicture};
 use bokehcam::frame::ColorImage;
@@ -51,7 +51,7 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
         window.wait(0.2);
         done
     };
-    assert_eq!(choose(&mut window, "Picture"), [Action::Browse(Browse::Behind)]);
+    assert_eq!(choose(&mut window, "Picture"), [Action::Browse(PathKind::Background)]);
     assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
     choose(&mut window, "Colour");
     assert!(matches!(window.state.look.background, Background::Color(_)));
@@ -59,11 +59,11 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
         file: Some("wall.jpg".into()),
         image: ColorImage::new(2, 2),
     }));
-    let request = window.state.apply_update(Update::Behind(wall.clone()));
+    let request = window.state.apply_update(Update::Background(wall.clone()));
     assert!(matches!(request, Some(Request::Look(look)) if look.background == wall));
     window.wait(0.1);
     assert!(window.place_of("wall.jpg").is_some());
-    assert_eq!(window.click_on("Choose picture…"), [Action::Browse(Browse::Behind)]);
+    assert_eq!(window.click_on("Choose picture…"), [Action::Browse(PathKind::Background)]);
     window.state.apply(Action::Undo);
     assert!(matches!(window.state.look.background, Background::Color(_)), "as every other change");
 }
@@ -99,7 +99,7 @@ fn its_first_seconds_count_from_the_first_picture() {
 /// Counts the rectangles drawn with the ring's stroke.
 fn rings(window: &mut Window) -> usize {
     let (_, output) = window.pass_with_output(Vec::new());
-    let color = super::super::theme::Colors::of(window.ctx.theme()).text;
+    let color = super::super::theme::Colors::for_theme(window.ctx.theme()).text;
     let is_ring =
         |shape: &egui::Shape| matches!(shape, egui::Shape::Rect(rect) if rect.stroke == egui::Stroke::new(2.0, color));
     let count = output.shapes.iter().filter(|clipped| is_ring(&clipped.shape)).count();

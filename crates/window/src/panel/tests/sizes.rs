@@ -36,7 +36,7 @@ fn any_window_and_any_text() {
     for size in [(1, 1), (100, 80), (320, 1000), (1280, 720), (4096, 2304)] {
         for text_scale in [0.75, 1.0, 3.0] {
             for mut state in states() {
-                state.habits.text_scale = text_scale;
+                state.preferences.text_scale = text_scale;
                 let mut window = Window::of(state, size);
                 window.wait(0.1);
             }
@@ -48,7 +48,7 @@ fn any_window_and_any_text() {
 fn the_panel_is_within_the_window() {
     for (size, text_scale) in [((1280, 720), 1.0), ((640, 480), 1.0), ((1280, 720), 3.0), ((4096, 2304), 2.0)] {
         let mut state = sample::state();
-        state.habits.text_scale = text_scale;
+        state.preferences.text_scale = text_scale;
         let mut window = Window::of(state, size);
         window.wait(0.5);
         let rect = window.panel.sheet.rect().expect("the panel is shown");
@@ -73,7 +73,7 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
     for (change, texts) in shown {
         let mut state = sample::state();
         state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
-        state.habits.text_scale = 3.0;
+        state.preferences.text_scale = 3.0;
         change(&mut state);
         let mut window = Window::of(state, (500, 400));
         window.wait(0.5);
@@ -89,7 +89,7 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
         assert_eq!(said, 1, "that it is smaller than was chosen");
     }
     let mut state = sample::state();
-    state.habits.text_scale = 3.0;
+    state.preferences.text_scale = 3.0;
     let mut window = Window::of(state, (1280, 720));
     window.wait(0.5);
     assert!(window.ctx.zoom_factor() == 3.0 && window.state.notes.is_empty());
@@ -179,7 +179,7 @@ fn a_canvas_without_pixels_is_no_picture() {
 fn in_the_instruments_no_text_runs_over_another() {
     for text_scale in [1.0, 1.6] {
         let mut state = sample::state();
-        (state.instruments, state.panel, state.habits.text_scale) = (true, false, text_scale);
+        (state.instruments, state.panel, state.preferences.text_scale) = (true, false, text_scale);
         state.meters.fill_with_samples();
         let mut window = Window::of(state, (1280, 720));
         window.wait(0.5);

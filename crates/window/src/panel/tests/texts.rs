@@ -16,14 +16,14 @@ fn windows() -> Vec<Window> {
     let changes: [&dyn Fn(&mut State); 17] = [
         &|_| {},
         &|state| {
-            state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
-            (state.self_timer, state.kept_in, state.frozen) = (true, Some("gone".into()), true);
-            (state.mirror, state.between) = (true, true);
+            state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
+            (state.self_timer, state.saved_in, state.frozen) = (true, Some("gone".into()), true);
+            (state.mirror, state.is_transitional) = (true, true);
         },
         &|state| state.look.effect = Effect::TiltShift,
-        &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
+        &|state| (state.look.focus, state.look.strength) = (tweak::focus_on_point(0.5, 0.5), Strength::Percent(0.0)),
         &|state| {
-            state.look.strength = Strength::Lens(tweak::LENS);
+            state.look.strength = Strength::Lens(tweak::DEFAULT_LENS);
             state.look.aperture.shape = bokehcam::bokeh::aperture::Shape::Ring { inner: 0.5 };
         },
         &|state| {
@@ -37,11 +37,11 @@ fn windows() -> Vec<Window> {
         &|state| state.help = true,
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
-            running.ways = vec![
+            running.depth_methods = vec![
                 DepthMethod::Measured,
                 DepthMethod::Stereo,
                 DepthMethod::Person,
-                DepthMethod::PersonAndDistance,
+                DepthMethod::PersonAndMonoDepth,
                 DepthMethod::Plate,
             ];
             (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
@@ -50,7 +50,7 @@ fn windows() -> Vec<Window> {
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
             running.name = "demo".into();
-            (state.look.focus_range_m, state.trouble) = (0.5, Some("No space left on device: x; kept".into()));
+            (state.look.focus_range_m, state.output_failure) = (0.5, Some("No space left on device: x; kept".into()));
             state.apply(Action::Section("More", false));
         },
         &|state| {
@@ -69,7 +69,7 @@ fn windows() -> Vec<Window> {
             state.source = Source::Lost("gone".into());
             state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MAX_BINS] });
         },
-        &|state| (state.source, state.trouble) = (Source::Ended, Some("gone".into())),
+        &|state| (state.source, state.output_failure) = (Source::Ended, Some("gone".into())),
         &|state| (state.source, state.virtual_cameras) = (Source::Opening, Vec::new()),
     ];
     let mut windows = Vec::new();
@@ -117,9 +117,9 @@ fn the_table_has_all_texts_and_no_others() {
         texts::tr(does);
         texts::tr(keys);
     }
-    let english = table::english();
+    let english = table::english_table();
     let missing: Vec<String> =
-        table::seen().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
+        table::recorded_texts().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
     let lines: Vec<String> = missing.iter().map(|text| format!("{text:?} = \"\"")).collect();
     assert!(missing.is_empty(), "texts.toml has not:\n{}", lines.join("\n"));
     let gone: Vec<&String> = english.keys().filter(|text| !is_written(text)).collect();
@@ -129,7 +129,7 @@ fn the_table_has_all_texts_and_no_others() {
 #[test]
 fn what_is_said_while_it_runs_is_in_the_table_too() {
     let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
-    let english = table::english();
+    let english = table::english_table();
     let literal = |after: &str| {
         let text = after.trim_start().strip_prefix('"')?.split('"').next()?.to_owned();
         (text.contains(' ') && text.starts_with(char::is_uppercase)).then_some(text)
@@ -156,8 +156,8 @@ fn all_that_is_drawn_is_translated() {
         "Manual Mode",
         "Aperture Priority",
     ];
-    let english = table::english();
-    texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
+    let english = table::english_table();
+    texts::set_translation(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
     let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();
     let controls = ["Brightness", "White balance", "Auto exposure", "Exposure time"];
     let levels = ["draft", "fast", "balanced", "high", "best", "auto", "full"];

@@ -31,11 +31,11 @@ fn the_self_timer_counts_to_one_snapshot_and_is_called_off_by_escape() {
 fn a_look_that_takes_a_while_is_said_to_be_worked_on() {
     let mut window = Window::new();
     let says = |window: &mut Window| window.texts().iter().any(|text| text == "Working…");
-    window.state.between = true;
+    window.state.is_transitional = true;
     assert!(!says(&mut window), "hardly anybody would see it");
     window.wait(0.1);
     assert!(says(&mut window));
-    window.state.between = false;
+    window.state.is_transitional = false;
     assert!(!says(&mut window));
 }
 
@@ -45,7 +45,7 @@ fn the_folder_is_offered_once_something_is_in_it() {
     window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
     assert!(window.texts().contains(&"Timer".to_owned()) && !window.texts().contains(&"Open folder".to_owned()));
     let folder = std::path::PathBuf::from("/home/me/Bilder");
-    window.state.apply_update(crate::state::Update::Kept(folder.clone()));
+    window.state.apply_update(crate::state::Update::SavedIn(folder.clone()));
     window.wait(0.2);
     assert!(window.texts().contains(&"Open folder".to_owned()), "{:?}", window.texts());
     let requests = window.state.apply(Action::OpenFolder);

@@ -5,7 +5,7 @@ use egui::{Key, Modifiers, pos2};
 use super::super::super::state::{Action, Output, Transport};
 use super::Window;
 
-const TRANSPORT: Transport = Transport { place: 3, frames: 101, time_ns: 1_230_000_000, length_ns: 61_000_000_000 };
+const TRANSPORT: Transport = Transport { frame: 3, frames: 101, time_ns: 1_230_000_000, length_ns: 61_000_000_000 };
 
 fn of_a_recording() -> Window {
     let mut window = Window::new();
@@ -21,9 +21,9 @@ fn a_recording_has_a_bar_that_goes_with_the_panel_and_a_camera_has_none() {
     let mut window = of_a_recording();
     let time = "0:01.23 / 1:01.00";
     assert!(window.place_of(time).is_some_and(|at| at.y > 680.0), "{:?}", window.texts());
-    window.state.bare = true;
+    window.state.controls_hidden = true;
     assert!(window.place_of(time).is_none());
-    window.state.bare = false;
+    window.state.controls_hidden = false;
     window.wait(5.0);
     assert!(window.place_of(time).is_some(), "beside the panel it stays");
     window.state.full_screen = true;
@@ -52,14 +52,14 @@ fn in_a_small_window_the_bar_makes_room_for_the_panel() {
 fn keys_step_pause_and_go_to_the_start() {
     let mut window = of_a_recording();
     assert_eq!(window.press(Key::PageDown, Modifiers::NONE), [Action::Step(1)]);
-    assert!(window.state.frozen && window.state.transport.unwrap().place == 4);
+    assert!(window.state.frozen && window.state.transport.unwrap().frame == 4);
     window.press(Key::PageUp, Modifiers::NONE);
     window.press(Key::PageUp, Modifiers::NONE);
-    assert_eq!(window.state.transport.unwrap().place, 2);
+    assert_eq!(window.state.transport.unwrap().frame, 2);
     assert_eq!(window.press(Key::Home, Modifiers::NONE), [Action::Seek(0)]);
     // The step before the first frame wraps around to the last.
     window.press(Key::PageUp, Modifiers::NONE);
-    assert_eq!(window.state.transport.unwrap().place, 100);
+    assert_eq!(window.state.transport.unwrap().frame, 100);
     window.press(Key::Z, Modifiers::NONE);
     assert!(!window.state.frozen);
     window.state.transport = None;

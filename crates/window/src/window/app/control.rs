@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use crate::lent::RemoteChanges;
+use crate::remote_changes::RemoteChanges;
 use crate::session::{CurrentShutter, SnapshotRequest};
 use crate::state::{Action, DepthMethod, Running, Source};
 use crate::window::{Control, UserEvent};
@@ -90,7 +90,7 @@ impl ControllableRun for Remote {
     fn switch_pictures(&self, on: Option<bool>) -> Result<bool, Answer> {
         self.run_on_window(move |app, events| {
             let on = on.unwrap_or(app.state.off);
-            app.perform(Action::Off(!on), events);
+            app.perform_action(Action::Off(!on), events);
             on
         })
     }
@@ -101,14 +101,14 @@ impl ControllableRun for Remote {
 
     fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
         let rules = Arc::clone(rules);
-        self.run_on_window(move |app, events| app.change(&patch, &*rules, events))?
+        self.run_on_window(move |app, events| app.apply_remote_patch(&patch, &*rules, events))?
     }
 
-    fn set_depth_source(&self, way: &str) -> Result<(), Answer> {
-        let way = way.parse().map_err(Answer::invalid_request)?;
+    fn set_depth_source(&self, depth_method: &str) -> Result<(), Answer> {
+        let depth_method = depth_method.parse().map_err(Answer::invalid_request)?;
         self.run_on_window(move |app, events| {
-            app.check_depth_method(way)?;
-            app.perform(Action::DepthBy(way), events);
+            app.check_depth_method(depth_method)?;
+            app.perform_action(Action::SetDepthMethod(depth_method), events);
             Ok(())
         })?
     }
@@ -130,36 +130,41 @@ impl App {
     }
 
     /// Applies a temporary look change. Returns a note about settings without effect.
-    fn change(&mut self, patch: &Patch, rules: &dyn Rules, events: &ActiveEventLoop) -> Result<Option<String>, Answer> {
+    fn apply_remote_patch(
+        &mut self,
+        patch: &Patch,
+        rules: &dyn Rules,
+        events: &ActiveEventLoop,
+    ) -> Result<Option<String>, Answer> {
         let note = match &self.state.source {
             Source::Running(running) => rules.apply_patch(patch, &self.state.look, &source_facts(running))?.1,
             _ => None,
         };
-        let look = self.state.patched(patch).map_err(Answer::invalid_request)?;
-        let before = self.state.chosen_look();
-        self.perform(Action::Look { look: Box::new(look), stroke: None }, events);
-        let after = self.state.chosen_look();
+        let look = self.state.patch_look(patch).map_err(Answer::invalid_request)?;
+        let before = self.state.look_as_chosen();
+        self.perform_action(Action::Look { look: Box::new(look), stroke: None }, events);
+        let after = self.state.look_as_chosen();
         self.remote_control.iter_mut().for_each(|remote| remote.remote_changes.record(&before, &after));
         Ok(note)
     }
 
     /// Checks that the source supports this depth method; the error lists those it supports.
-    fn check_depth_method(&self, way: DepthMethod) -> Result<(), Answer> {
-        let ways = self.state.ways();
-        if ways.contains(&way) {
+    fn check_depth_method(&self, depth_method: DepthMethod) -> Result<(), Answer> {
+        let depth_methods = self.state.depth_methods();
+        if depth_methods.contains(&depth_method) {
             return Ok(());
         }
-        let there = match ways {
+        let there = match depth_methods {
             [] => "it has no source of depth".to_owned(),
-            ways => format!("use {}", ways.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
+            methods => format!("use {}", methods.iter().map(DepthMethod::to_string).collect::<Vec<_>>().join(", ")),
         };
-        Err(Answer::invalid_request(format!("{way} is not available for this source: {there}")))
+        Err(Answer::invalid_request(format!("{depth_method} is not available for this source: {there}")))
     }
 
     /// Returns the look to be saved: without changes by remote control.
     pub(super) fn look_to_save(&self) -> Look {
-        let look = self.state.chosen_look();
-        self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.without(&look))
+        let look = self.state.look_as_chosen();
+        self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.remove_from(&look))
     }
 
     /// Saves the displayed frame, and sends the result to `answer`.
@@ -173,18 +178,18 @@ impl App {
         }
         if let Some(remote_control) = &mut self.remote_control {
             remote_control.request = Some(SnapshotRequest { to, answer });
-            self.snapshot();
+            self.save_snapshot();
         }
         Ok(())
     }
 
     /// Blocks or unblocks pictures, both for the screen and the outputs.
-    pub(super) fn switch_off(&mut self, off: bool) {
+    pub(super) fn set_off(&mut self, off: bool) {
         self.off.store(off, Ordering::Release);
         self.last_frame_at = Instant::now();
         if off {
             (self.view, self.held, self.snapshot_due) = (None, None, false);
-            self.session.let_go();
+            self.session.release_frame();
         }
     }
 
@@ -201,7 +206,7 @@ impl App {
             on: !state.off,
             source: state.source_name.clone(),
             size,
-            depth: state.way().map(|way| way.to_string()),
+            depth: state.depth_method().map(|depth_method| depth_method.to_string()),
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
             watched: Some(self.demand.has_watchers()),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),

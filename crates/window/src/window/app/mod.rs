@@ -1,12 +1,12 @@
 //! The window's event loop.
 
-mod calls;
 mod control;
-mod drop;
-mod hold;
+mod dropped_files;
+mod held_frame;
 mod receive;
+mod render;
 mod seek;
-mod show;
+mod user_events;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,8 +19,8 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
 use super::gfx::Gfx;
-use super::memory::Memory;
-use super::{Ended, Preview, UserEvent, WindowError};
+use super::saved_state::SavedState;
+use super::{Preview, PreviewOutcome, UserEvent, WindowError};
 use crate::meters::Totals;
 use crate::panel::{Panel, SystemFonts};
 use crate::session::{Closed, Session, Wake};
@@ -58,7 +58,7 @@ pub(super) struct App {
     frames: Option<Receiver<View>>,
     /// Progress of the background plate, if depth comes from it.
     guide: Option<Arc<Guide>>,
-    seeking: seek::Seeking,
+    seek_state: seek::SeekState,
     view: Option<View>,
     /// Whether `view` has not been displayed yet.
     view_is_new: bool,
@@ -92,8 +92,8 @@ pub(super) struct App {
     hidden_at: Option<Instant>,
     empty: bool,
     /// Persistent state of the window, and its file.
-    memory: Memory,
-    memory_file: Option<PathBuf>,
+    saved_state: SavedState,
+    saved_state_file: Option<PathBuf>,
     close_at_end: bool,
     /// Remote control, if it is enabled.
     remote_control: Option<control::RemoteControl>,
@@ -106,7 +106,8 @@ pub(super) struct App {
 impl App {
     /// Starts the session immediately, so that the source opens in parallel with the window.
     pub fn new(preview: Preview, proxy: EventLoopProxy<UserEvent>) -> Result<Self, WindowError> {
-        let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, control, stop } = preview;
+        let Preview { mut state, session, theme, device, close_at_end, saved_state, saved_state_file, control, stop } =
+            preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
         // Fails only if the event loop has ended.
@@ -122,9 +123,9 @@ impl App {
         let off = Arc::clone(&session.off);
         let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
         let clock = Clock::system();
-        state.meters.begin(clock.now_ns());
+        state.meters.set_start(clock.now_ns());
         let ctx = egui::Context::default();
-        let fonts = calls::init_appearance(&ctx, theme, &proxy);
+        let fonts = user_events::init_appearance(&ctx, theme, &proxy);
         Ok(Self {
             state,
             output_request,
@@ -135,11 +136,11 @@ impl App {
             proxy,
             gfx: None,
             device,
-            session: Session::begin(session, wake)?,
+            session: Session::start(session, wake)?,
             wake_pending,
             frames: None,
             guide: None,
-            seeking: seek::Seeking::default(),
+            seek_state: seek::SeekState::default(),
             view: None,
             view_is_new: false,
             false_colors: Views::default(),
@@ -160,8 +161,8 @@ impl App {
             covered: false,
             hidden_at: None,
             empty: false,
-            memory,
-            memory_file,
+            saved_state,
+            saved_state_file,
             close_at_end,
             remote_control,
             off,
@@ -171,7 +172,7 @@ impl App {
     }
 
     /// Closes the window and then the session, and adds display statistics to the report.
-    pub fn end(self) -> Result<Ended, WindowError> {
+    pub fn finish(self) -> Result<PreviewOutcome, WindowError> {
         let Self { gfx, view, frames, session, state, failed, remote_control, .. } = self;
         // Stops remote control first.
         drop(remote_control);
@@ -188,7 +189,7 @@ impl App {
             Source::Lost(why) => Some(why),
             _ => None,
         };
-        failed.map_or(Ok(Ended { report, lost, unwritten }), Err)
+        failed.map_or(Ok(PreviewOutcome { report, lost, unwritten }), Err)
     }
 
     fn set_title(&self) {
@@ -224,18 +225,18 @@ impl ApplicationHandler<UserEvent> for App {
         if self.gfx.is_some() {
             return;
         }
-        match Gfx::open(events, &self.ctx, self.memory.size, self.state.full_screen, self.device.clone()) {
+        match Gfx::open(events, &self.ctx, self.saved_state.size, self.state.full_screen, self.device.clone()) {
             Ok(mut gfx) => {
                 gfx.input.init_accesskit(events, &gfx.window, self.proxy.clone());
                 self.gfx = Some(gfx);
-                self.update_wanted();
+                self.update_output_request();
             }
             Err(error) => {
                 self.failed = Some(error);
                 return events.exit();
             }
         }
-        self.receive(events);
+        self.process_session(events);
         self.request_redraw();
     }
 
@@ -254,10 +255,10 @@ impl ApplicationHandler<UserEvent> for App {
                 return self.draw(events);
             }
             WindowEvent::CloseRequested => {
-                self.perform(Action::Close, events);
+                self.perform_action(Action::Close, events);
                 return self.on_input();
             }
-            WindowEvent::DroppedFile(path) => return self.on_drop(path),
+            WindowEvent::DroppedFile(path) => return self.on_file_dropped(path),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
                 // Time while the window is invisible does not count as latency.
@@ -267,7 +268,7 @@ impl ApplicationHandler<UserEvent> for App {
             WindowEvent::Resized(size) => {
                 gfx.presenter.resize((size.width, size.height));
                 self.empty = size.width == 0 || size.height == 0;
-                self.memory.size = gfx.size().or(self.memory.size);
+                self.saved_state.size = gfx.size().or(self.saved_state.size);
             }
             _ => {}
         }
@@ -290,7 +291,7 @@ impl ApplicationHandler<UserEvent> for App {
             return events.exit();
         }
         self.update_watch();
-        self.check_silence();
+        self.update_silence();
         let now = Instant::now();
         if self.layout_at.is_some_and(|at| at <= now) {
             self.request_redraw();
@@ -302,11 +303,11 @@ impl ApplicationHandler<UserEvent> for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        let Some(path) = &self.memory_file else { return };
-        self.memory.size = self.gfx.as_ref().and_then(Gfx::size).or(self.memory.size);
-        self.memory.habits = self.state.habits.clone();
-        self.memory.set_source(&self.state.source_name);
-        self.memory.set_look(&self.look_to_save());
-        self.memory.write(path);
+        let Some(path) = &self.saved_state_file else { return };
+        self.saved_state.size = self.gfx.as_ref().and_then(Gfx::size).or(self.saved_state.size);
+        self.saved_state.preferences = self.state.preferences.clone();
+        self.saved_state.set_source(&self.state.source_name);
+        self.saved_state.set_look(&self.look_to_save());
+        self.saved_state.write(path);
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
 use super::App;
-use super::seek::Seeking;
+use super::seek::SeekState;
 use crate::session::SessionEvent;
 use crate::state::Source;
 use bokehcam::link::Receiver;
@@ -17,23 +17,24 @@ const POSITION_PERIOD: Duration = Duration::from_millis(250);
 
 impl App {
     /// Handles the session's events, and takes the newest frame.
-    pub(super) fn receive(&mut self, events: &ActiveEventLoop) {
+    pub(super) fn process_session(&mut self, events: &ActiveEventLoop) {
         // Before reading the queue, so that later events wake this thread again.
         self.wake_pending.swap(false, Ordering::AcqRel);
         let mut changed = false;
-        while let Some(event) = self.session.hear() {
+        while let Some(event) = self.session.try_recv_event() {
             match event {
-                SessionEvent::Views(frames, guide, seeker) => {
+                SessionEvent::RunStarted(frames, guide, seeker) => {
                     self.guide = guide;
-                    (self.seeking, self.state.transport, self.state.settled) = (Seeking::of(seeker), None, false);
+                    (self.seek_state, self.state.transport, self.state.shows_final_photo) =
+                        (SeekState::new(seeker), None, false);
                     changed |= self.state.set_plate_step(None);
                     self.last_frame_at = Instant::now();
                     // A pending snapshot was meant for the previous source.
                     self.snapshot_due = false;
                     self.frames = Some(frames);
-                    self.state.meters.restart();
+                    self.state.meters.clear_recent();
                 }
-                SessionEvent::Blurred(blurred) => changed |= self.show_reblurred(*blurred),
+                SessionEvent::Reblurred(blurred) => changed |= self.show_reblurred(*blurred),
                 SessionEvent::Copy(text) => {
                     if let Some(gfx) = &mut self.gfx {
                         gfx.input.set_clipboard_text(text);
@@ -50,7 +51,7 @@ impl App {
         if changed {
             self.update_settings();
             self.layout_at = Some(Instant::now());
-            self.update_wanted();
+            self.update_output_request();
             self.set_title();
             if self.close_at_end && matches!(self.state.source, Source::Ended | Source::Lost(_)) {
                 events.exit();
@@ -60,17 +61,17 @@ impl App {
         let newest = self.frames.as_mut().and_then(Receiver::try_recv).filter(|_| !self.state.off);
         if newest.is_some() {
             self.last_frame_at = Instant::now();
-            self.check_silence();
+            self.update_silence();
             if self.state.set_plate_step(self.guide.as_ref().map(|guide| guide.step())) {
                 self.layout_at = Some(Instant::now());
                 changed = true;
             }
         }
         // A frozen frame must be in memory, to be saved, and have its own depth: frames are replaced until both hold.
-        let stays = self.state.frozen || self.state.settled;
+        let stays = self.state.frozen || self.state.shows_final_photo;
         let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.is_depth_reused;
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
-        if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
+        if let Some(view) = newest.filter(|view| !stays || self.seek_state.is_requested_frame(view)) {
             self.update_position(&view);
             if self.state.transport.is_some() && self.laid_out.elapsed() > POSITION_PERIOD {
                 self.layout_at = Some(Instant::now());
@@ -79,17 +80,17 @@ impl App {
             let is_whole = view.picture.memory().is_some() && !view.is_transitional && !view.trace.is_depth_reused;
             // With `close_at_end`, all requested frames are shown.
             let may_settle = self.state.is_photo() && !self.close_at_end;
-            self.state.settled = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);
+            self.state.shows_final_photo = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);
             // The new frame must be held anew.
             self.held = None;
             self.view = Some(view);
             self.view_is_new = true;
             changed = true;
             if self.snapshot_due {
-                self.snapshot();
+                self.save_snapshot();
             }
         }
-        self.update_held();
+        self.update_held_frame();
         self.update_watch();
         if changed {
             self.request_redraw();

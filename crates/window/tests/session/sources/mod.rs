@@ -26,7 +26,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     assert_eq!((seeker.frames(), seeker.length_ns()), (FRAMES, FRAMES as u64 * 40_000_000));
     let film = folder.path().join("film.y4m");
     let output = Output { name: film.display().to_string(), is_camera: false };
-    watched.session.send(Request::Begin(output.clone()));
+    watched.session.send(Request::StartOutput(output.clone()));
     let mut last_ns = 0;
     for place in [8, 3, 11, 0, 11] {
         let number = seeker.request_frame(place);
@@ -43,7 +43,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         last_ns = after.stamp.time_ns;
         assert!((seeker.position_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }
-    watched.session.send(Request::End(output));
+    watched.session.send(Request::StopOutput(output));
     let closed = watched.heard.session.close();
     assert_eq!(closed.failed, None);
     assert!(closed.report.unwrap().frames.balance());

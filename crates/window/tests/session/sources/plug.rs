@@ -15,7 +15,7 @@ use bokehcam::source::devices::Choice;
 use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
 use bokehcam_lab::synthetic::Synthetic;
-use bokehcam_window::services::{Opened, Services, SettingsStore, Switch};
+use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod};
 use bokehcam_window::system::System;
 
@@ -47,14 +47,14 @@ pub struct Plug {
 pub const CAMERA: &str = "/dev/video-test";
 
 impl Services for Plug {
-    fn sources(&mut self) -> Vec<Choice> {
+    fn list_sources(&mut self) -> Vec<Choice> {
         let camera = self.was_in.then(|| Choice { name: CAMERA.into(), label: "A camera".into() });
-        camera.into_iter().chain(self.system.sources()).collect()
+        camera.into_iter().chain(self.system.list_sources()).collect()
     }
-    fn virtual_cameras(&mut self) -> Vec<Choice> {
+    fn list_virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str, way: Option<DepthMethod>) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String> {
         match (name, self.is_in.load(Ordering::SeqCst)) {
             (CAMERA, false) => Err("no such camera".into()),
             (CAMERA, true) => {
@@ -66,39 +66,48 @@ impl Services for Plug {
                     vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
                 let camera = Camera { modes, faces_user: true, is_relative: false };
                 let (notes, controls) = (Vec::new(), Vec::new());
-                Ok(Opened { name, source, has_depth, ways: Vec::new(), way, notes, controls, camera })
+                Ok(OpenedSource {
+                    name,
+                    source,
+                    has_depth,
+                    depth_methods: Vec::new(),
+                    depth_method,
+                    notes,
+                    controls,
+                    camera,
+                })
             }
-            _ => self.system.open(name, way),
+            _ => self.system.open(name, depth_method),
         }
     }
-    fn devices_changed(&mut self) -> bool {
+    fn have_devices_changed(&mut self) -> bool {
         let is_in = self.is_in.load(Ordering::SeqCst);
         std::mem::replace(&mut self.was_in, is_in) != is_in
     }
-    fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
+    fn set_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
         assert_eq!(name, CAMERA);
         self.mode = Some((size, fps));
     }
-    fn check(&self, name: &str) -> Result<(), String> {
-        self.system.check(name)
+    fn check_source_name(&self, name: &str) -> Result<(), String> {
+        self.system.check_source_name(name)
     }
-    fn set_control(&mut self, knob: &str, value: i64) -> Result<Vec<CameraControl>, String> {
-        self.system.set_control(knob, value)
+    fn set_control(&mut self, control: &str, value: i64) -> Result<Vec<CameraControl>, String> {
+        self.system.set_control(control, value)
     }
-    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        self.system.executor(settings, size)
+    fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.system.create_executor(settings, size)
     }
-    fn output(
+    fn open_output(
         &mut self,
         name: &str,
         size: (u32, u32),
         ns: u64,
         stop: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Sink>, String> {
-        self.system.output(name, size, ns, stop)
+        self.system.open_output(name, size, ns, stop)
     }
-    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
-        self.system.command(look, source, outputs, switches)
+    fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
+        self.system.format_command(look, source, outputs, switches)
     }
     fn settings(&mut self) -> &mut dyn SettingsStore {
         self.system.settings()

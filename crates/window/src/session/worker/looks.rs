@@ -1,7 +1,7 @@
 //! Looks of a session: applying new ones, and finding the one of a displayed frame.
 
 use super::super::{SaveOptions, SessionEvent, Still, held};
-use super::Host;
+use super::SessionWorker;
 use bokehcam::control::Answer;
 use bokehcam::engine::Images;
 use bokehcam::files::user_folders as folders;
@@ -10,22 +10,22 @@ use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still::write_color;
 
 /// Number of recent looks kept for snapshots: a frame in flight has one of the last few.
-const KEPT_LOOKS: usize = 512;
+const MAX_KEPT_LOOKS: usize = 512;
 
-impl Host {
+impl SessionWorker {
     /// Blurs with another look from now on, and records it with its change number for snapshots.
-    pub(super) fn adopt(&mut self, look: Look) {
-        self.start.look = look;
+    pub(super) fn switch_look(&mut self, look: Look) {
+        self.config.look = look;
         let number = self.looks.back().map_or(0, |(last, _)| last + 1);
         let look = self.effective_look();
         self.looks.push_back((number, look.clone()));
-        if self.looks.len() > KEPT_LOOKS {
+        if self.looks.len() > MAX_KEPT_LOOKS {
             self.looks.pop_front();
         }
         // The held frame is on the screen, so it comes first.
-        self.blur_held();
-        if let Some(live) = &mut self.live
-            && let Err(line) = live.switch_look(look, number, &mut *self.start.services)
+        self.reblur_held();
+        if let Some(pipeline) = &mut self.pipeline
+            && let Err(line) = pipeline.switch_look(look, number, &mut *self.config.services)
         {
             self.events.note(line);
         }
@@ -33,31 +33,33 @@ impl Host {
 
     /// Returns the look as far as the source supports it.
     pub(super) fn effective_look(&self) -> Look {
-        self.live.as_ref().map_or_else(|| self.start.look.clone(), |live| live.effective(&self.start.look))
+        self.pipeline
+            .as_ref()
+            .map_or_else(|| self.config.look.clone(), |pipeline| pipeline.adapt_look(&self.config.look))
     }
 
     /// Holds a frame on the screen.
-    pub(super) fn hold(&mut self, still: Still, is_behind: bool) {
-        self.held = Some(held::HeldBlur::new(still, self.start.look.focus));
-        if is_behind {
-            self.blur_held();
+    pub(super) fn hold_frame(&mut self, still: Still, is_outdated: bool) {
+        self.held = Some(held::HeldBlur::new(still, self.config.look.focus));
+        if is_outdated {
+            self.reblur_held();
         }
     }
 
     /// Blurs the held frame with the latest look.
-    fn blur_held(&mut self) {
+    fn reblur_held(&mut self) {
         if let (Some(held), Some((number, look))) = (&mut self.held, self.looks.back()) {
-            match held.blur(look, *number, &mut *self.start.services) {
-                Ok(blurred) => self.events.send(SessionEvent::Blurred(Box::new(blurred))),
+            match held.blur(look, *number, &mut *self.config.services) {
+                Ok(blurred) => self.events.send(SessionEvent::Reblurred(Box::new(blurred))),
                 Err(line) => self.events.note(line),
             }
         }
     }
 
     /// Saves a snapshot with the settings that reproduce it: those of the look that blurred the frame.
-    pub(super) fn save(&self, still: &Still, SaveOptions { with_sources, request }: &SaveOptions) {
+    pub(super) fn save_frame(&self, still: &Still, SaveOptions { with_sources, request }: &SaveOptions) {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
-        let look = its_look.map_or(&self.start.look, |(_, look)| look);
+        let look = its_look.map_or(&self.config.look, |(_, look)| look);
         let settings = Patch::from_look(&look.for_frame(&still.coc, still.quality)).values();
         let Images { color, depth, blurred: picture } = &still.images;
         let sources = with_sources.then_some((color, depth.as_ref()));
@@ -68,7 +70,7 @@ impl Host {
                 let _ = path.parent().map(std::fs::create_dir_all);
                 write_color(path, picture, false).map(|()| path.to_owned())
             }
-            None => snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot),
+            None => snapshot::save(&self.config.folders.pictures, &folders::stem(), &snapshot),
         };
         let answer = match saved {
             Ok(path) => {

@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use egui_winit::accesskit_winit::WindowEvent as Access;
+use egui_winit::accesskit_winit::WindowEvent as AccessibilityEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
-use super::hold::focus_m;
+use super::held_frame::focus_distance_m;
 use crate::panel::SystemFonts;
 use crate::window::{ThemeChoice, UserEvent, desktop};
 use bokehcam::pipeline::View;
@@ -33,10 +33,10 @@ pub(super) fn init_appearance(
 impl App {
     /// Updates the state with a new frame's properties.
     pub(super) fn update_from_frame(&mut self, view: &View) {
-        self.state.focus_m = focus_m(&view.coc);
-        let (between, part) = (view.is_transitional, view.crop);
-        if (self.state.between, self.state.part) != (between, part) {
-            (self.state.between, self.state.part) = (between, part);
+        self.state.focus_m = focus_distance_m(&view.coc);
+        let (is_transitional, crop) = (view.is_transitional, view.crop);
+        if (self.state.is_transitional, self.state.crop) != (is_transitional, crop) {
+            (self.state.is_transitional, self.state.crop) = (is_transitional, crop);
             self.layout_at = Some(Instant::now());
         }
     }
@@ -44,19 +44,21 @@ impl App {
     /// Handles a user event, and schedules a layout of the controls.
     pub(super) fn handle_user_event(&mut self, call: UserEvent, events: &ActiveEventLoop) {
         match call {
-            UserEvent::Session => return self.receive(events),
+            UserEvent::Session => return self.process_session(events),
             UserEvent::Control => self.run_remote_tasks(events),
-            UserEvent::Access(event) => match (event.window_event, &mut self.gfx) {
-                (Access::InitialTreeRequested, _) => {
-                    self.panel.stays = true;
+            UserEvent::Accessibility(event) => match (event.window_event, &mut self.gfx) {
+                (AccessibilityEvent::InitialTreeRequested, _) => {
+                    self.panel.is_always_visible = true;
                     self.ctx.enable_accesskit();
                 }
-                (Access::AccessibilityDeactivated, _) => {
-                    self.panel.stays = false;
+                (AccessibilityEvent::AccessibilityDeactivated, _) => {
+                    self.panel.is_always_visible = false;
                     self.ctx.disable_accesskit();
                 }
-                (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),
-                (Access::ActionRequested(_), None) => {}
+                (AccessibilityEvent::ActionRequested(request), Some(gfx)) => {
+                    gfx.input.on_accesskit_action_request(request)
+                }
+                (AccessibilityEvent::ActionRequested(_), None) => {}
             },
             UserEvent::Theme(theme) => self.ctx.set_theme(theme),
             UserEvent::Fonts => self.fonts.install(&self.ctx),

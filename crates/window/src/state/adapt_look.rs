@@ -5,7 +5,7 @@ use bokehcam::look::{Effect, Look, SourceDepth};
 
 impl State {
     /// Returns the properties of the source's depth.
-    pub fn known(&self) -> SourceDepth {
+    pub fn source_depth(&self) -> SourceDepth {
         let size = match &self.source {
             Source::Running(running) => running.size,
             _ => (1280, 720),
@@ -15,14 +15,14 @@ impl State {
     }
 
     /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
-    pub fn chosen_look(&self) -> Look {
+    pub fn look_as_chosen(&self) -> Look {
         let is_fitted = self.effect_replaced && self.look.effect == Effect::Blur;
         Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
     }
 
     /// Returns the look as far as the source supports it, and records if its effect was replaced.
     pub(super) fn adapt_look(&mut self, look: Look) -> Look {
-        let adapted = look.for_source(self.known());
+        let adapted = look.for_source(self.source_depth());
         self.effect_replaced |= adapted.effect != look.effect;
         adapted
     }
@@ -39,7 +39,7 @@ mod tests {
     #[test]
     fn where_depth_is_relative_no_look_has_metres() {
         let mut state = state();
-        let lens = Strength::Lens(tweak::LENS);
+        let lens = Strength::Lens(tweak::DEFAULT_LENS);
         state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
         state.apply_update(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
         let told = state.apply_update(Update::Source(running(true)));
@@ -47,12 +47,12 @@ mod tests {
         assert_eq!(state.look.metric_setting(), None);
         assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
         // Nothing restores them, and keys for metric settings change the amount instead.
-        let before = tweak::amount(&state.look, 720).unwrap();
+        let before = tweak::coc_fraction(&state.look, 720).unwrap();
         let mut more = state.look.clone();
-        tweak::f_number_by(&mut more, 0.5, 1.0, (1280, 720));
+        tweak::scale_f_number(&mut more, 0.5, 1.0, (1280, 720));
         state.apply(Action::Look { look: Box::new(more), stroke: None });
-        assert!(state.look.metric_setting().is_none() && tweak::amount(&state.look, 720).unwrap() > 1.5 * before);
-        assert!(state.patched(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
+        assert!(state.look.metric_setting().is_none() && tweak::coc_fraction(&state.look, 720).unwrap() > 1.5 * before);
+        assert!(state.patch_look(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
     }
 
     #[test]
@@ -60,9 +60,9 @@ mod tests {
         let size = (1280, 720);
         let mut look = Look::default();
         for focus_m in [0.7, 1.24, 3.0] {
-            look.strength = Strength::Lens(tweak::lens_of(&look, focus_m, size));
+            look.strength = Strength::Lens(tweak::lens_for_look(&look, focus_m, size));
             let Strength::Lens(lens) = look.strength else { unreachable!() };
-            look.strength = Strength::from_fraction(tweak::lens_fraction(lens, focus_m, size));
+            look.strength = Strength::from_fraction(tweak::lens_coc_fraction(lens, focus_m, size));
             assert_eq!(look, Look::default(), "focused at {focus_m} m");
         }
     }

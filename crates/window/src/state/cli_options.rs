@@ -1,15 +1,15 @@
 //! The window's state as command-line options.
 
 use super::{Shown, State};
-use crate::services::Switch;
+use crate::services::CliOption;
 use bokehcam::look::Look;
 
 impl State {
     /// Returns the options that reproduce the window, besides those of the look; defaults are omitted.
-    pub fn switches(&self) -> Vec<Switch> {
+    pub fn cli_options(&self) -> Vec<CliOption> {
         let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
         let yes = |on: bool| on.then(|| "true".to_owned());
-        let switches = [
+        let cli_options = [
             ("show", shown.map(|shown| shown.to_string())),
             ("split", self.split.map(|at| format!("{at:.3}"))),
             ("mirror", (self.mirror != self.camera.faces_user).then(|| self.mirror.to_string())),
@@ -18,9 +18,9 @@ impl State {
             ("panel", (!self.panel).then(|| "false".to_owned())),
             // Without any look setting the saved look would be loaded.
             ("fresh", yes(self.look == Look::default())),
-            ("single-keys", (!self.habits.single_keys).then(|| "false".to_owned())),
-            ("text-scale", (self.habits.text_scale != 1.0).then(|| format!("{:.2}", self.habits.text_scale))),
+            ("single-keys", (!self.preferences.single_keys).then(|| "false".to_owned())),
+            ("text-scale", (self.preferences.text_scale != 1.0).then(|| format!("{:.2}", self.preferences.text_scale))),
         ];
-        switches.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+        cli_options.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
     }
 }

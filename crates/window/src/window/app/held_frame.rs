@@ -21,10 +21,10 @@ const MIN_SILENT_PERIODS: u32 = 10;
 
 impl App {
     /// Starts or ends holding the displayed picture, so that the session blurs it with every new look.
-    pub(super) fn update_held(&mut self) {
-        if !self.state.keeps_picture() {
+    pub(super) fn update_held_frame(&mut self) {
+        if !self.state.is_picture_static() {
             if self.held.take().is_some() {
-                self.session.let_go();
+                self.session.release_frame();
             }
             return;
         }
@@ -33,12 +33,12 @@ impl App {
         if view.picture.memory().is_none() && matches!(self.state.source, Source::Running(_)) {
             return;
         }
-        let Some(still) = still(view, self.holds + 1) else { return };
+        let Some(still) = capture_still(view, self.holds + 1) else { return };
         self.holds = still.number;
         self.held = Some(still.number);
         // A settled photo is blurred again because live frames use a lower quality level.
-        let is_behind = view.is_transitional || self.snapshot_due || self.state.settled;
-        self.session.hold(still, is_behind);
+        let is_outdated = view.is_transitional || self.snapshot_due || self.state.shows_final_photo;
+        self.session.hold_frame(still, is_outdated);
     }
 
     /// Whether a frame lacks the depth that `look` needs, although the source can provide it.
@@ -56,17 +56,17 @@ impl App {
         view.picture = Picture::from_memory(Pooled::detached(blurred));
         view.depth = depth.map(Pooled::detached);
         (view.coc, view.change, view.is_transitional, view.trace.quality) = (coc, change, false, quality);
-        (self.state.focus_m, self.state.between) = (focus_m(&coc), false);
+        (self.state.focus_m, self.state.is_transitional) = (focus_distance_m(&coc), false);
         self.drawn = None;
         if self.snapshot_due {
-            self.snapshot();
+            self.save_snapshot();
         }
         true
     }
 
     /// Updates how long a running source has been silent. An unplugged camera reports no error, because it may come
     /// back.
-    pub(super) fn check_silence(&mut self) {
+    pub(super) fn update_silence(&mut self) {
         let silent = match &self.state.source {
             Source::Running(running) if self.watch.is_some() && !self.state.off => {
                 let patience = MIN_SILENCE.max(Duration::from_nanos(running.period_ns) * MIN_SILENT_PERIODS);
@@ -85,11 +85,11 @@ impl App {
     pub(super) fn update_watch(&mut self) {
         self.hidden_at = if self.is_hidden() { self.hidden_at.or_else(|| Some(Instant::now())) } else { None };
         let is_watched = self.hidden_at.is_none_or(|at| at.elapsed() < PAUSE_DELAY);
-        match (&self.watch, is_watched && !self.state.stands_still()) {
+        match (&self.watch, is_watched && !self.state.can_pause_pipeline()) {
             (None, true) => {
                 self.watch = Some(self.demand.watch());
                 self.last_frame_at = Instant::now();
-                self.state.meters.restart();
+                self.state.meters.clear_recent();
             }
             (Some(_), false) => self.watch = None,
             (None, false) | (Some(_), true) => {}
@@ -98,7 +98,7 @@ impl App {
 }
 
 /// Copies a frame to memory as still number `number`; `None` if it is only on a device.
-pub(super) fn still(view: &View, number: u64) -> Option<Still> {
+pub(super) fn capture_still(view: &View, number: u64) -> Option<Still> {
     let blurred = view.picture.memory();
     let color = view.color.as_deref().or(blurred)?.clone();
     let images = Images { color, depth: view.depth.as_deref().cloned(), blurred: blurred.cloned().unwrap_or_default() };
@@ -106,7 +106,7 @@ pub(super) fn still(view: &View, number: u64) -> Option<Still> {
 }
 
 /// Returns the distance of the focal plane in metres, if the blur follows depth.
-pub(super) fn focus_m(coc: &CocField) -> Option<f32> {
+pub(super) fn focus_distance_m(coc: &CocField) -> Option<f32> {
     match coc {
         CocField::Depth(coc) => Some(coc.focus_m),
         CocField::Uniform { .. } | CocField::Ramp(_) => None,

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::state::Habits;
+use crate::state::Preferences;
 use bokehcam::files::{input, whole};
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::RecordingError;
@@ -16,20 +16,21 @@ use bokehcam::source::SourceName;
 /// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
-pub struct Memory {
+pub struct SavedState {
     /// The source's name on the command line.
     pub source: Option<String>,
     /// The user's preferences.
-    pub habits: Habits,
+    #[serde(rename = "habits")]
+    pub preferences: Preferences,
     /// Settings of the look, by name.
     pub look: BTreeMap<String, String>,
     /// The window's size, if known.
-    pub size: Option<Size>,
+    pub size: Option<WindowSize>,
 }
 
 /// A window's size in logical pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Size {
+pub struct WindowSize {
     /// Width.
     pub width: f64,
     /// Height.
@@ -43,17 +44,17 @@ pub struct Size {
 const MIN_SIDE: f64 = 200.0;
 const MAX_SIDE: f64 = 16_384.0;
 
-impl Memory {
+impl SavedState {
     /// Reads the file; `None` if it is missing or invalid, without an error, because users do not edit it.
     pub fn read(path: &Path) -> Option<Self> {
-        let memory: Self = toml::from_str(&input::read_text(path, input::MAX_SETTINGS_BYTES).ok()?).ok()?;
+        let saved: Self = toml::from_str(&input::read_text(path, input::MAX_SETTINGS_BYTES).ok()?).ok()?;
         let sides = MIN_SIDE..=MAX_SIDE;
-        let size = memory.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
-        Some(Self { size, habits: memory.habits.checked(), ..memory })
+        let size = saved.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
+        Some(Self { size, preferences: saved.preferences.into_valid(), ..saved })
     }
 
     /// Returns the source, if its devices still exist.
-    pub fn source(&self) -> Option<String> {
+    pub fn restore_source(&self) -> Option<String> {
         let is_there = |name: &&String| {
             SourceName::from_str(name).is_ok_and(|name| name.device_nodes().iter().all(|node| node.exists()))
         };
@@ -65,25 +66,26 @@ impl Memory {
         self.source = Some(absolute_name(name)).filter(|name| !name.is_empty());
     }
 
-    /// Returns the look, without pictures that cannot be read any more, each of which is reported to `gone`; `None` if
+    /// Returns the look, without pictures that cannot be read any more, each of which is reported to `on_missing`; `None` if
     /// no valid look is saved.
-    pub fn look(&self, mut gone: impl FnMut(String)) -> Option<Look> {
+    pub fn restore_look(&self, mut on_missing: impl FnMut(String)) -> Option<Look> {
         let settings = self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()));
         let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
-        let mut is_gone = |read: Result<(), RecordingError>| read.map_err(|error| gone(error.to_string())).is_err();
-        patch.behind = patch.behind.filter(|name| !is_gone(name.load().map(drop)));
-        patch.aperture = patch.aperture.filter(|name| !is_gone(name.load().map(drop)));
+        let mut is_missing =
+            |read: Result<(), RecordingError>| read.map_err(|error| on_missing(error.to_string())).is_err();
+        patch.behind = patch.behind.filter(|name| !is_missing(name.load().map(drop)));
+        patch.aperture = patch.aperture.filter(|name| !is_missing(name.load().map(drop)));
         patch.apply_to(&Look::default()).ok()
     }
 
     /// Sets the look.
     pub fn set_look(&mut self, look: &Look) {
-        let kept = |value: String| match value.strip_prefix("image:") {
+        let portable = |value: String| match value.strip_prefix("image:") {
             Some(file) => format!("image:{}", absolute_name(file)),
             None => value,
         };
         let values = Patch::from_look(look).values().into_iter();
-        self.look = values.map(|(name, value)| (name.to_owned(), kept(value))).collect();
+        self.look = values.map(|(name, value)| (name.to_owned(), portable(value))).collect();
     }
 
     /// Writes the file atomically. On failure, the next preview starts with defaults.
@@ -112,21 +114,21 @@ mod tests {
     fn what_is_written_is_read_and_nonsense_is_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/window.toml");
-        assert_eq!(Memory::read(&path), None);
+        assert_eq!(SavedState::read(&path), None);
         let look = Look { rim: 0.3, highlights: 4.0, ..Look::default() };
-        let mut habits = Habits { text_scale: 1.5, single_keys: false, ..Habits::default() };
-        habits.sections.insert("For experts".into(), true);
-        let size = Some(Size { width: 1280.0, height: 720.5, maximized: true });
-        let mut memory = Memory { source: Some("0".into()), habits, size, ..Memory::default() };
+        let mut preferences = Preferences { text_scale: 1.5, single_keys: false, ..Preferences::default() };
+        preferences.sections.insert("For experts".into(), true);
+        let size = Some(WindowSize { width: 1280.0, height: 720.5, maximized: true });
+        let mut saved = SavedState { source: Some("0".into()), preferences, size, ..SavedState::default() };
         let never = |line: String| panic!("{line}");
-        assert_eq!(memory.look(never), None);
-        memory.set_look(&look);
-        memory.write(&path);
-        let read = Memory::read(&path).unwrap();
-        assert_eq!((read.look(never), &read), (Some(look.clone()), &memory));
+        assert_eq!(saved.restore_look(never), None);
+        saved.set_look(&look);
+        saved.write(&path);
+        let read = SavedState::read(&path).unwrap();
+        assert_eq!((read.restore_look(never), &read), (Some(look.clone()), &saved));
         for text in ["width", "[size]\nwidth = 3\n", "[habits]\ntext-scale = \"big\"\n"] {
             fs::write(&path, text).unwrap();
-            assert_eq!(Memory::read(&path), None, "{text}");
+            assert_eq!(SavedState::read(&path), None, "{text}");
         }
         // Invalid values are dropped, and the others remain.
         fs::write(
@@ -134,13 +136,13 @@ mod tests {
             "source = \"1\"\n[habits]\ntext-scale = 1e9\n[size]\nwidth = nan\nheight = 7\n[look]\nrim = \"9\"\n",
         )
         .unwrap();
-        let read = Memory::read(&path).unwrap();
-        assert_eq!((read.source.as_deref(), read.size, read.look(never)), (Some("1"), None, None));
-        assert_eq!(read.habits.text_scale, 3.0);
+        let read = SavedState::read(&path).unwrap();
+        assert_eq!((read.source.as_deref(), read.size, read.restore_look(never)), (Some("1"), None, None));
+        assert_eq!(read.preferences.text_scale, 3.0);
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "nothing is left beside it");
-        memory.look.insert("behind".into(), "image:/no/such/wall.jpg".into());
+        saved.look.insert("behind".into(), "image:/no/such/wall.jpg".into());
         let mut gone = Vec::new();
-        assert_eq!(memory.look(|line| gone.push(line)), Some(look), "without the picture that is gone");
+        assert_eq!(saved.restore_look(|line| gone.push(line)), Some(look), "without the picture that is gone");
         assert!(gone.len() == 1 && gone[0].contains("/no/such/wall.jpg"), "{gone:?}");
     }
 }

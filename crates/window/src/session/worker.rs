@@ -7,56 +7,56 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 
-use super::live::Live;
-use super::{Closed, Command, EventSender, SessionEvent, Start, held};
-use crate::services::Switch;
+use super::pipeline_run::PipelineRun;
+use super::{Closed, Command, EventSender, SessionConfig, SessionEvent, held};
+use crate::services::CliOption;
 use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::files::user_folders as folders;
 use bokehcam::link::demand::Watch;
 use bokehcam::look::Look;
 use bokehcam::pipeline::PipelineError;
-use bokehcam::sink::switch::{MemberState, Notice};
+use bokehcam::sink::tee_control::{MemberEvent, MemberState};
 use bokehcam::sink::{self, Target};
 use bokehcam::stats::Report;
 
 /// State of the session, owned by its thread.
-pub(super) struct Host {
+pub(super) struct SessionWorker {
     /// Configuration; look, source and outputs are kept current.
-    start: Start,
+    config: SessionConfig,
     /// Depth method that the user requested; `None` for the default.
-    way: Option<DepthMethod>,
+    depth_method: Option<DepthMethod>,
     /// Held while an output is active, to keep the source from pausing.
     watch: Option<Watch>,
     events: EventSender,
     commands: mpsc::Sender<Command>,
-    live: Option<Live>,
+    pipeline: Option<PipelineRun>,
     /// Number of runs so far, which is the number of the current run.
     runs: u64,
     report: Option<Report>,
     /// Message of the first output that failed.
     failed: Option<String>,
     /// Whether a run has ever started.
-    began: bool,
+    has_started: bool,
     /// Recent looks of the current run with their change numbers, oldest first.
     looks: VecDeque<(u64, Look)>,
     /// The frame held on the screen.
     held: Option<held::HeldBlur>,
 }
 
-impl Host {
+impl SessionWorker {
     /// Creates a session that has not started yet; `commands` sends to the session itself.
-    pub fn new(start: Start, events: EventSender, commands: mpsc::Sender<Command>) -> Self {
+    pub fn new(config: SessionConfig, events: EventSender, commands: mpsc::Sender<Command>) -> Self {
         Self {
-            start,
-            way: None,
+            config,
+            depth_method: None,
             watch: None,
             events,
             commands,
-            live: None,
+            pipeline: None,
             runs: 0,
             report: None,
             failed: None,
-            began: false,
+            has_started: false,
             looks: VecDeque::new(),
             held: None,
         }
@@ -65,8 +65,8 @@ impl Host {
     /// Opens the source, then processes commands until it must close.
     pub fn run(mut self, inbox: &mpsc::Receiver<Command>) -> Closed {
         self.report_choices();
-        self.recover();
-        self.open();
+        self.recover_recordings();
+        self.open_source();
         while let Some(command) = self.next_command(inbox) {
             let mut next = Some(command);
             while let Some(command) = next.take() {
@@ -82,15 +82,15 @@ impl Host {
                                 }
                             }
                         }
-                        self.adopt(*look);
+                        self.switch_look(*look);
                     }
-                    Command::Request(request) => self.carry_out(request),
-                    Command::Save(still, saving) => self.save(&still, &saving),
-                    Command::Hold(still, is_behind) => self.hold(*still, is_behind),
-                    Command::ShutterControl => self.held = None,
-                    Command::Copy(switches) => self.copy(&switches),
+                    Command::Request(request) => self.handle_request(request),
+                    Command::SaveFrame(still, saving) => self.save_frame(&still, &saving),
+                    Command::HoldFrame(still, is_outdated) => self.hold_frame(*still, is_outdated),
+                    Command::ReleaseFrame => self.held = None,
+                    Command::CopyCommand(cli_options) => self.copy_command(&cli_options),
                     Command::OutputEvent(run, notice) => self.handle_output_event(run, &notice),
-                    Command::Ended(run, ended) => self.handle_run_end(run, *ended),
+                    Command::RunEnded(run, ended) => self.handle_run_end(run, *ended),
                     Command::Close => return self.close(inbox),
                 }
             }
@@ -100,7 +100,7 @@ impl Host {
 
     /// Ends the run, and processes the final events of its outputs.
     fn close(mut self, inbox: &mpsc::Receiver<Command>) -> Closed {
-        self.stop();
+        self.stop_run();
         for command in inbox.try_iter() {
             if let Command::OutputEvent(run, notice) = command {
                 self.handle_output_event(run, &notice);
@@ -110,128 +110,131 @@ impl Host {
     }
 
     /// Recovers recordings of an earlier preview that was killed.
-    fn recover(&self) {
-        for kept in self.start.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
+    fn recover_recordings(&self) {
+        for kept in self.config.folders.all().flat_map(|folder| sink::recover_videos(folder, folders::is_video)) {
             self.events.note(format!("An earlier recording was interrupted: it is kept as {}", folders::shown(&kept)));
         }
     }
 
     /// Carries out a request of the window.
-    fn carry_out(&mut self, request: Request) {
+    fn handle_request(&mut self, request: Request) {
         match request {
             Request::Open(name) => {
                 // The depth method is specific to a source.
-                self.way = self.way.filter(|_| self.start.source == name);
-                self.start.source = name;
-                self.stop();
-                self.open();
+                self.depth_method = self.depth_method.filter(|_| self.config.source == name);
+                self.config.source = name;
+                self.stop_run();
+                self.open_source();
             }
-            Request::TakePlate => match self.live.as_ref().and_then(|live| live.guide.as_ref()) {
+            Request::CapturePlate => match self.pipeline.as_ref().and_then(|pipeline| pipeline.guide.as_ref()) {
                 Some(guide) => guide.request_capture(),
                 None => self.set_depth_method(DepthMethod::Plate),
             },
-            Request::DepthBy(way) => self.set_depth_method(way),
-            Request::Begin(output) => {
-                self.write_to(output);
+            Request::SetDepthMethod(depth_method) => self.set_depth_method(depth_method),
+            Request::StartOutput(output) => {
+                self.add_output(output);
                 self.report_outputs();
             }
-            Request::End(output) => {
-                self.start.outputs.retain(|other| *other != output);
-                if let Some(live) = &self.live {
-                    live.remove_output(&output);
+            Request::StopOutput(output) => {
+                self.config.outputs.retain(|other| *other != output);
+                if let Some(pipeline) = &self.pipeline {
+                    pipeline.remove_output(&output);
                 }
                 self.report_outputs();
             }
-            Request::Control(name, value) => match self.start.services.set_control(&name, value) {
+            Request::Control(name, value) => match self.config.services.set_control(&name, value) {
                 Ok(controls) => self.events.send_update(Update::Controls(controls)),
                 Err(line) => self.events.note(line),
             },
-            Request::OpenFolder(folder) => self.events.open(folder),
+            Request::OpenFolder(folder) => self.events.open_folder(folder),
             Request::Refresh => self.report_choices(),
             Request::SavePreset(name, look) => {
-                let saved = self.start.services.settings().save_preset(&name, &look);
+                let saved = self.config.services.settings().save_preset(&name, &look);
                 self.report_presets(saved, &format!("Saved as preset '{name}'"));
             }
             Request::RenamePreset(name, new) => {
-                let renamed = self.start.services.settings().rename_preset(&name, &new);
+                let renamed = self.config.services.settings().rename_preset(&name, &new);
                 self.report_presets(renamed, &format!("Preset '{name}' is called '{new}' now"));
             }
             Request::DeletePreset(name) => {
-                let deleted = self.start.services.settings().delete_preset(&name);
+                let deleted = self.config.services.settings().delete_preset(&name);
                 self.report_presets(deleted, &format!("Preset '{name}' is deleted"));
             }
-            Request::Offer(name) => self.offer(name),
-            Request::Browse(what) => self.browse(what),
-            Request::Mode(size, fps) => self.set_mode(size, fps),
+            Request::Offer(name) => self.check_offer(name),
+            Request::Browse(what) => self.open_file_chooser(what),
+            Request::Mode(size, fps) => self.set_camera_mode(size, fps),
             // The window handles all others, or they have their own command.
             _ => {}
         }
     }
 
     /// Reopens the source with another depth method, if it supports that.
-    fn set_depth_method(&mut self, way: DepthMethod) {
-        if let Err(line) = self.start.services.check_depth_method(&self.start.source, way) {
+    fn set_depth_method(&mut self, depth_method: DepthMethod) {
+        if let Err(line) = self.config.services.check_depth_method(&self.config.source, depth_method) {
             return self.events.note(line);
         }
-        self.way = Some(way);
-        self.stop();
-        self.open();
+        self.depth_method = Some(depth_method);
+        self.stop_run();
+        self.open_source();
     }
 
     /// Reports the result of a preset change, and the current presets.
     fn report_presets(&mut self, changed: Result<(), String>, done: &str) {
         self.events.note(changed.map_or_else(|line| line, |()| done.to_owned()));
-        self.events.send_update(Update::Presets(self.start.services.settings().presets()));
+        self.events.send_update(Update::Presets(self.config.services.settings().presets()));
     }
 
     fn report_outputs(&mut self) {
-        self.start.output_request.set_needed_in_memory(!self.start.outputs.is_empty());
-        self.watch = (!self.start.outputs.is_empty()).then(|| self.start.demand.watch());
-        self.events.send_update(Update::Outputs(self.start.outputs.clone()));
+        self.config.output_request.set_needed_in_memory(!self.config.outputs.is_empty());
+        self.watch = (!self.config.outputs.is_empty()).then(|| self.config.demand.watch());
+        self.events.send_update(Update::Outputs(self.config.outputs.clone()));
     }
 
     /// Reports that no source is running; `source` has the reason. Recordings end; a virtual camera continues with the
     /// next source.
     fn report_no_source(&mut self, source: Source) {
         // Before the first run, recordings requested at the start still wait for a source.
-        if self.began {
-            self.start.outputs.retain(|output| output.is_camera);
+        if self.has_started {
+            self.config.outputs.retain(|output| output.is_camera);
         }
         self.report_outputs();
         self.events.send_update(Update::Source(source));
     }
 
     /// Opens the source and starts its run.
-    fn open(&mut self) {
+    fn open_source(&mut self) {
         self.events.send_update(Update::Source(Source::Opening));
-        let opened = match self.start.services.open(&self.start.source, self.way) {
+        let opened = match self.config.services.open(&self.config.source, self.depth_method) {
             Ok(opened) => opened,
             Err(line) => return self.report_no_source(Source::Lost(line)),
         };
-        self.start.source.clone_from(&opened.name);
+        self.config.source.clone_from(&opened.name);
         self.report_choices();
         self.events.send_update(Update::Camera(opened.camera.clone()));
         self.events.send_update(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.events.note(line));
         self.runs += 1;
-        self.start.output_request.set_needed_in_memory(!self.start.outputs.is_empty());
+        self.config.output_request.set_needed_in_memory(!self.config.outputs.is_empty());
         let (commands, run) = (self.commands.clone(), self.runs);
-        let to_host = commands.clone();
-        let wrote = move |written| {
-            let _ = to_host.send(Command::OutputEvent(run, written));
+        let to_worker = commands.clone();
+        let on_output_event = move |written| {
+            let _ = to_worker.send(Command::OutputEvent(run, written));
         };
         let ended = move |ended| {
-            let _ = commands.send(Command::Ended(run, Box::new(ended)));
+            let _ = commands.send(Command::RunEnded(run, Box::new(ended)));
         };
-        match Live::begin(opened, &mut self.start, &self.events, wrote, ended) {
-            Ok((live, source)) => {
-                self.looks = VecDeque::from([(0, live.effective(&self.start.look))]);
-                self.live = Some(live);
+        match PipelineRun::start(opened, &mut self.config, &self.events, on_output_event, ended) {
+            Ok((pipeline, source)) => {
+                self.looks = VecDeque::from([(0, pipeline.adapt_look(&self.config.look))]);
+                self.pipeline = Some(pipeline);
                 self.events.send_update(Update::Source(source));
                 // A recording ends with its source; a virtual camera continues with the next one.
-                let first = !std::mem::replace(&mut self.began, true);
-                let outputs = std::mem::take(&mut self.start.outputs);
-                outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.write_to(output));
+                let first = !std::mem::replace(&mut self.has_started, true);
+                let outputs = std::mem::take(&mut self.config.outputs);
+                outputs
+                    .into_iter()
+                    .filter(|output| output.is_camera || first)
+                    .for_each(|output| self.add_output(output));
                 self.report_outputs();
             }
             Err(line) => self.report_no_source(Source::Lost(line)),
@@ -239,16 +242,16 @@ impl Host {
     }
 
     /// Opens an output and adds it to the run; an unnamed recording gets a name.
-    fn write_to(&mut self, mut output: Output) {
-        let Some(live) = &self.live else { return self.events.note("There is no source to record.") };
+    fn add_output(&mut self, mut output: Output) {
+        let Some(pipeline) = &self.pipeline else { return self.events.note("There is no source to record.") };
         if output.name.is_empty() {
             output.name = self.unused_video_path().display().to_string();
         }
-        match self.start.services.output(&output.name, live.size, live.period_ns, &live.stop) {
+        match self.config.services.open_output(&output.name, pipeline.size, pipeline.period_ns, &pipeline.stop) {
             Ok(sink) => {
-                self.start.output_request.set_needed_in_memory(true);
-                live.add_output(&output, sink);
-                self.start.outputs.push(output);
+                self.config.output_request.set_needed_in_memory(true);
+                pipeline.add_output(&output, sink);
+                self.config.outputs.push(output);
             }
             Err(line) => self.events.note(line),
         }
@@ -257,29 +260,29 @@ impl Host {
     /// Returns an unused path for a recording.
     fn unused_video_path(&self) -> PathBuf {
         // A file appears under its name only when complete, so check the active outputs as well.
-        self.start
+        self.config
             .folders
-            .free_video(|path| self.start.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
+            .free_video(|path| self.config.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
     }
 
     /// Copies the equivalent command to the clipboard.
-    fn copy(&self, switches: &[Switch]) {
+    fn copy_command(&self, cli_options: &[CliOption]) {
         // The current recording's file already exists: the command gets a new name.
         let again = |output: &Output| match output.is_camera {
             true => output.name.clone(),
             false => self.unused_video_path().display().to_string(),
         };
-        let outputs: Vec<String> = self.start.outputs.iter().map(again).collect();
+        let outputs: Vec<String> = self.config.outputs.iter().map(again).collect();
         let look = self.effective_look();
-        let command = self.start.services.command(&look, &self.start.source, &outputs, switches);
+        let command = self.config.services.format_command(&look, &self.config.source, &outputs, cli_options);
         self.events.note(format!("Copied: {command}"));
         self.events.send(SessionEvent::Copy(command));
     }
 
     /// Handles an event of an output of the run with number `run`.
-    fn handle_output_event(&mut self, run: u64, Notice { member, fate }: &Notice) {
-        match fate {
-            MemberState::Began => self.events.note(match virtual_camera_name(member) {
+    fn handle_output_event(&mut self, run: u64, MemberEvent { member, state }: &MemberEvent) {
+        match state {
+            MemberState::Started => self.events.note(match virtual_camera_name(member) {
                 Some(camera) => format!("Calls have this picture now: choose the camera {camera}"),
                 None => format!("Recording to {}", folders::shown_output(member)),
             }),
@@ -292,10 +295,10 @@ impl Host {
             MemberState::Failed { why, .. } => {
                 tracing::error!("{why}");
                 self.failed.get_or_insert_with(|| why.clone());
-                self.events.send_update(Update::Trouble(why.clone()));
+                self.events.send_update(Update::OutputFailure(why.clone()));
                 // An output of an earlier run may have the same name as one of the current run.
                 if run == self.runs {
-                    self.start.outputs.retain(|output| output.name != *member);
+                    self.config.outputs.retain(|output| output.name != *member);
                     self.report_outputs();
                 }
             }
@@ -304,7 +307,7 @@ impl Host {
 
     /// Stores the report of an ended run. If the session did not stop it, reports the source as gone.
     fn handle_run_end(&mut self, run: u64, ended: Result<Report, PipelineError>) {
-        let was_stopped = run != self.runs || self.live.is_none();
+        let was_stopped = run != self.runs || self.pipeline.is_none();
         let source = match &ended {
             Ok(_) => Source::Ended,
             Err(failed) => Source::Lost(failed.fault.to_string()),
@@ -314,16 +317,16 @@ impl Host {
             Err(failed) => *failed.report,
         });
         if !was_stopped {
-            if let Some(live) = self.live.take() {
-                live.join();
+            if let Some(pipeline) = self.pipeline.take() {
+                pipeline.join();
             }
             self.report_no_source(source);
         }
     }
 
     /// Ends the current run and completes its outputs.
-    fn stop(&mut self) {
-        self.report = self.live.take().and_then(Live::stop).or_else(|| self.report.take());
+    fn stop_run(&mut self) {
+        self.report = self.pipeline.take().and_then(PipelineRun::stop).or_else(|| self.report.take());
     }
 }
 

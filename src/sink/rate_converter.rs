@@ -4,10 +4,10 @@ use std::time::Duration;
 
 /// Decides which frames of a constant-rate stream to repeat or drop, so that its duration matches that of the frames.
 #[derive(Debug)]
-pub(super) struct Steady {
+pub(super) struct RateConverter {
     /// Pictures per second, as numerator and denominator.
     rate: (u64, u64),
-    max_still: Duration,
+    max_gap: Duration,
     first_ns: Option<u64>,
     /// Time missing from the stream, because long gaps were cut.
     cut_ns: u64,
@@ -29,17 +29,17 @@ pub(super) enum Action {
 }
 
 /// A frame may be early or late by this fraction of a period before one is dropped or repeated: more than jitter.
-const MAX_OFFSET: f64 = 0.75;
+const MAX_OFFSET_PERIODS: f64 = 0.75;
 
-impl Steady {
-    /// Creates a stream of `rate`, in which no picture is repeated for longer than `max_still`.
-    pub(super) fn new(rate: (u64, u64), max_still: Duration) -> Self {
-        Self { rate, max_still, first_ns: None, cut_ns: 0, written: 0, dropped: 0 }
+impl RateConverter {
+    /// Creates a stream of `rate`, in which no picture is repeated for longer than `max_gap`.
+    pub(super) fn new(rate: (u64, u64), max_gap: Duration) -> Self {
+        Self { rate, max_gap, first_ns: None, cut_ns: 0, written: 0, dropped: 0 }
     }
 
     /// Longest time for which one picture is repeated.
-    pub(super) fn max_still(&self) -> Duration {
-        self.max_still
+    pub(super) fn max_gap(&self) -> Duration {
+        self.max_gap
     }
 
     /// Decides what to do with the next frame, captured at `time_ns`.
@@ -48,13 +48,13 @@ impl Steady {
         let pictures_per_ns = self.rate.0 as f64 / (self.rate.1 as f64 * 1e9);
         let elapsed_ns = time_ns.saturating_sub(first_ns).saturating_sub(self.cut_ns);
         // In periods: 0 is on time for the next picture of the stream, more is late.
-        let late = elapsed_ns as f64 * pictures_per_ns - self.written as f64;
-        if late < -MAX_OFFSET {
+        let late_periods = elapsed_ns as f64 * pictures_per_ns - self.written as f64;
+        if late_periods < -MAX_OFFSET_PERIODS {
             self.dropped += 1;
             return Action::Skip;
         }
-        let missing = (late + 1.0 - MAX_OFFSET).floor().max(0.0) as u64;
-        let max_repeats = (self.max_still.as_nanos() as f64 * pictures_per_ns).ceil() as u64;
+        let missing = (late_periods + 1.0 - MAX_OFFSET_PERIODS).floor().max(0.0) as u64;
+        let max_repeats = (self.max_gap.as_nanos() as f64 * pictures_per_ns).ceil() as u64;
         self.written += missing.min(max_repeats) + 1;
         if missing <= max_repeats {
             return Action::Repeat(missing);
@@ -73,11 +73,11 @@ mod tests {
     /// Returns the number of pictures written for frames at these times; checks that each is within a period of its
     /// time.
     fn written(rate: (u64, u64), times_ns: impl Iterator<Item = u64>) -> u64 {
-        let mut steady = Steady::new(rate, Duration::from_secs(10));
+        let mut converter = RateConverter::new(rate, Duration::from_secs(10));
         let (mut written, mut first_ns) = (0u64, None);
         for time_ns in times_ns {
             let first_ns = *first_ns.get_or_insert(time_ns);
-            match steady.schedule(time_ns) {
+            match converter.schedule(time_ns) {
                 Action::Repeat(missing) => {
                     written += missing + 1;
                     let shown_ns = (written - 1) * SECOND_NS * rate.1 / rate.0;
@@ -120,16 +120,16 @@ mod tests {
 
     #[test]
     fn a_long_gap_is_cut_and_what_follows_goes_on() {
-        let mut steady = Steady::new((10, 1), Duration::from_secs(2));
-        assert_eq!(steady.schedule(5 * SECOND_NS), Action::Repeat(0));
-        assert_eq!(steady.schedule(7 * SECOND_NS), Action::Repeat(19));
+        let mut converter = RateConverter::new((10, 1), Duration::from_secs(2));
+        assert_eq!(converter.schedule(5 * SECOND_NS), Action::Repeat(0));
+        assert_eq!(converter.schedule(7 * SECOND_NS), Action::Repeat(19));
         let hour = Duration::from_secs(3600);
-        let Action::RepeatAfterGap(20, gap) = steady.schedule(3607 * SECOND_NS + SECOND_NS / 10) else {
-            panic!("{steady:?}")
+        let Action::RepeatAfterGap(20, gap) = converter.schedule(3607 * SECOND_NS + SECOND_NS / 10) else {
+            panic!("{converter:?}")
         };
         assert!(gap.abs_diff(hour) < Duration::from_millis(1), "{gap:?}");
-        assert_eq!(steady.schedule(3607 * SECOND_NS + SECOND_NS / 5), Action::Repeat(0));
-        assert_eq!(steady.schedule(3607 * SECOND_NS + SECOND_NS / 5 + 1), Action::Skip);
-        assert_eq!(steady.dropped, 1);
+        assert_eq!(converter.schedule(3607 * SECOND_NS + SECOND_NS / 5), Action::Repeat(0));
+        assert_eq!(converter.schedule(3607 * SECOND_NS + SECOND_NS / 5 + 1), Action::Skip);
+        assert_eq!(converter.dropped, 1);
     }
 }

@@ -7,7 +7,7 @@ use egui::{
     Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
-use super::theme::{Colors, ROW, medium};
+use super::theme::{Colors, ROW, medium_font};
 use crate::texts::{tr, tr_with};
 
 /// Width of a number beside its label, in points.
@@ -35,7 +35,7 @@ impl<'a> Number<'a> {
     }
 
     /// Adds a prefix and a suffix, such as a unit.
-    pub fn unit(self, before: &'a str, after: &'a str) -> Self {
+    pub fn with_affixes(self, before: &'a str, after: &'a str) -> Self {
         Self { affixes: [before, after], ..self }
     }
 
@@ -50,14 +50,14 @@ impl<'a> Number<'a> {
 }
 
 /// Widgets with a tooltip.
-pub trait Hinted {
+pub trait Tooltip {
     /// Adds a translated tooltip unless `text` is empty. Suppresses it where the widget is scrolled out of sight, which
     /// egui does not check.
-    fn hint(self, text: &str) -> Self;
+    fn tooltip(self, text: &str) -> Self;
 }
 
-impl Hinted for Response {
-    fn hint(self, text: &str) -> Self {
+impl Tooltip for Response {
+    fn tooltip(self, text: &str) -> Self {
         let is_out_of_sight = |at| self.rect.contains(at) && !self.interact_rect.contains(at);
         match text.is_empty() || self.ctx.pointer_latest_pos().is_some_and(is_out_of_sight) {
             true => self,
@@ -67,7 +67,7 @@ impl Hinted for Response {
 }
 
 /// Adds a label, a number to drag or type, and a slider below them. Returns whether the number changed.
-pub fn number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
+pub fn add_number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
     let Number { label, hint, ref range, digits, logarithmic, affixes: [before, after] } = *spec;
     let label = tr(label);
     let mut changed = false;
@@ -80,7 +80,7 @@ pub fn number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
                 ui.set_max_width(max_width);
                 ui.add(Label::new(label).wrap())
             });
-            let name = name.inner.hint(hint);
+            let name = name.inner.tooltip(hint);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
@@ -106,7 +106,7 @@ pub fn number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
                     }
                     Some(number)
                 });
-                let is_other = ui.add(drag).labelled_by(name.id).hint(hint).changed();
+                let is_other = ui.add(drag).labelled_by(name.id).tooltip(hint).changed();
                 // Moving the keyboard focus re-enters the displayed, rounded value: that is no change.
                 if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
                     (*value, changed) = (typed, true);
@@ -121,7 +121,7 @@ pub fn number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
         let mut slid = *value;
         let slider = Slider::new(&mut slid, range.clone()).clamping(SliderClamping::Edits).show_value(false);
         let slider = ui.add(slider.logarithmic(logarithmic).smallest_positive(smallest)).labelled_by(name.inner.id);
-        if slider.hint(hint).changed() {
+        if slider.tooltip(hint).changed() {
             // Rounds to one more digit than is displayed.
             let steps = 10f32.powi(digits as i32 + 1);
             (*value, changed) = ((slid * steps).round() / steps, true);
@@ -156,16 +156,16 @@ pub fn take_message(ctx: &Context) -> Option<String> {
 
 /// Adds a group of radio buttons in a grid, given as name, tooltip and value; `is_selectable` tells which values are
 /// selectable. Returns the value that was clicked, or selected by the arrow keys.
-pub fn choose<T: PartialEq + Copy>(
+pub fn add_choice<T: PartialEq + Copy>(
     ui: &mut Ui,
     what: &str,
     options: &[(&str, &str, T)],
     chosen: T,
     is_selectable: impl Fn(T) -> bool,
 ) -> Option<T> {
-    let colors = Colors::here(ui);
+    let colors = Colors::for_ui(ui);
     let what = tr(what);
-    let font = |chosen: bool| FontId::new(12.5, if chosen { medium() } else { egui::FontFamily::Proportional });
+    let font = |chosen: bool| FontId::new(12.5, if chosen { medium_font() } else { egui::FontFamily::Proportional });
     let width_of = |name: &str| ui.painter().layout_no_wrap(tr(name).to_owned(), font(true), colors.text).size().x;
     let widest = options.iter().map(|(name, ..)| width_of(name)).fold(0.0, f32::max) + 12.0;
     // As many columns as fit the widest name in this language, with the rows evenly filled.
@@ -175,7 +175,7 @@ pub fn choose<T: PartialEq + Copy>(
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW * rows as f32), Sense::hover());
     ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
     let cell_width = rect.width() / columns as f32;
-    let mut group = Group::default();
+    let mut group = RadioGroup::default();
     for (index, &(name, hint, option)) in options.iter().enumerate() {
         let name = tr(name);
         let (row, column) = (index / columns, index % columns);
@@ -191,25 +191,25 @@ pub fn choose<T: PartialEq + Copy>(
         if is_chosen || is_hovered {
             ui.painter().rect_filled(inner, CornerRadius::same(6), colors.fill(is_chosen, is_hovered));
         }
-        let text = colors.on_fill(is_chosen, is_possible);
+        let text = colors.text_on_fill(is_chosen, is_possible);
         let name = ui.painter().layout(name.to_owned(), font(is_chosen), text, cell_width);
         let at = Align2::CENTER_CENTER.anchor_size(inner.center(), name.size()).min;
         ui.painter().with_clip_rect(cell).galley(at, name, text);
-        group.add(response.hint(hint), option);
+        group.add(response.tooltip(hint), option);
     }
-    group.chosen(ui)
+    group.selection(ui)
 }
 
 /// A radio group: the user selects by click, or by an arrow key from the neighbour that has the focus.
-pub struct Group<T>(Vec<(Response, T)>);
+pub struct RadioGroup<T>(Vec<(Response, T)>);
 
-impl<T> Default for Group<T> {
+impl<T> Default for RadioGroup<T> {
     fn default() -> Self {
         Self(Vec::new())
     }
 }
 
-impl<T> Group<T> {
+impl<T> RadioGroup<T> {
     /// Adds the next widget; disabled ones (hover only) are never selected.
     pub fn add(&mut self, control: Response, option: T) {
         if control.sense.senses_click() {
@@ -218,7 +218,7 @@ impl<T> Group<T> {
     }
 
     /// Returns the value selected in this pass.
-    pub fn chosen(mut self, ui: &Ui) -> Option<T> {
+    pub fn selection(mut self, ui: &Ui) -> Option<T> {
         let focused = self.0.iter().position(|(control, _)| control.has_focus());
         let by_arrow = focused.and_then(|at| {
             let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
@@ -237,7 +237,7 @@ impl<T> Group<T> {
 }
 
 /// Adds a drop-down list, given as name, tooltip and value. Returns a newly selected value.
-pub fn dropdown<'a, T: PartialEq>(
+pub fn add_dropdown<'a, T: PartialEq>(
     ui: &mut Ui,
     what: &str,
     shown: &str,
@@ -248,7 +248,7 @@ pub fn dropdown<'a, T: PartialEq>(
     let menu = ComboBox::from_id_salt(what).selected_text(shown).truncate().show_ui(ui, |ui| {
         for (name, hint, option) in options {
             let is_chosen = option == *chosen;
-            if ui.selectable_label(is_chosen, name).hint(hint).clicked() && !is_chosen {
+            if ui.selectable_label(is_chosen, name).tooltip(hint).clicked() && !is_chosen {
                 picked = Some(option);
             }
         }
@@ -262,8 +262,8 @@ pub fn dropdown<'a, T: PartialEq>(
 }
 
 /// Adds a labelled switch. Returns whether it was clicked.
-pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
-    let colors = Colors::here(ui);
+pub fn add_switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
+    let colors = Colors::for_ui(ui);
     let label = tr(label);
     let font = TextStyle::Body.resolve(ui.style());
     let text =
@@ -279,12 +279,12 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
     let at = Align2::LEFT_CENTER.anchor_size(rect.left_center(), text.size()).min;
     painter.galley(at, text, ui.visuals().text_color());
-    response.hint(hint).clicked()
+    response.tooltip(hint).clicked()
 }
 
 /// Adds a button. Returns whether it was clicked.
-pub fn button(ui: &mut Ui, text: &str, hint: &str) -> bool {
-    ui.button(tr(text)).hint(hint).clicked()
+pub fn add_button(ui: &mut Ui, text: &str, hint: &str) -> bool {
+    ui.button(tr(text)).tooltip(hint).clicked()
 }
 
 /// Sets the accessible name of a list or a field for screen readers.
@@ -293,15 +293,15 @@ pub fn set_accessible_name(control: &Response, name: &str, role: Role) {
 }
 
 /// Adds a line of small explanatory text.
-pub fn remark(ui: &mut Ui, text: &str) {
-    let colors = Colors::here(ui);
+pub fn add_remark(ui: &mut Ui, text: &str) {
+    let colors = Colors::for_ui(ui);
     ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(colors.weak));
 }
 
 /// Adds a path, shortened at its beginning because the end identifies the file.
-pub fn path(ui: &mut Ui, path: &str) {
+pub fn add_path(ui: &mut Ui, path: &str) {
     let shown = bokehcam::files::user_folders::shown_output(path);
-    ui.scope(|ui| remark(ui, &truncate_start(&shown, 38))).response.on_hover_text(path);
+    ui.scope(|ui| add_remark(ui, &truncate_start(&shown, 38))).response.on_hover_text(path);
 }
 
 /// Returns the last `max_chars` characters of a text, the first of them replaced by an ellipsis if it is longer.
@@ -313,10 +313,10 @@ pub fn truncate_start(text: &str, max_chars: usize) -> String {
 }
 
 /// Adds a foldable section. Returns whether its title was clicked.
-pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
-    let colors = Colors::here(ui);
+pub fn add_foldable_section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
+    let colors = Colors::for_ui(ui);
     ui.add_space(4.0);
-    let title = RichText::new(tr(name)).family(medium()).size(13.5).color(colors.text);
+    let title = RichText::new(tr(name)).family(medium_font()).size(13.5).color(colors.text);
     let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open));
     let folded = header.show_unindented(ui, |ui| {
         ui.add_space(2.0);

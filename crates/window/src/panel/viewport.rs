@@ -6,7 +6,7 @@ use super::Canvas;
 
 /// The picture's rectangle on the screen, in points.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct Viewport {
     pub rect: Rect,
     /// The part of `rect` inside the window.
     pub visible: Rect,
@@ -18,11 +18,11 @@ pub struct Place {
 
 /// Returns the scale at which the whole picture fits its area: window pixels per picture pixel.
 pub fn fit_scale(ctx: &Context, (width, height): (u32, u32)) -> f32 {
-    let window = super::dock::room(ctx).size() * ctx.pixels_per_point();
+    let window = super::dock::picture_area(ctx).size() * ctx.pixels_per_point();
     (window.x / width.max(1) as f32).min(window.y / height.max(1) as f32)
 }
 
-impl Place {
+impl Viewport {
     /// Computes the geometry of a canvas; `None` without a picture.
     pub fn new(canvas: Canvas, pixels_per_point: f32, mirror: bool) -> Option<Self> {
         let area = canvas.area;

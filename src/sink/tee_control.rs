@@ -11,25 +11,25 @@ use super::output_thread::{Backpressure, Outcome, OutputThread};
 /// Adds and removes members of a [`Tee`], from any thread. Both take effect with the next frame, or soon after if there
 /// are no frames.
 #[derive(Clone)]
-pub struct Switchboard {
-    to: Sender<Request>,
-    report: Report,
+pub struct TeeControl {
+    request_sender: Sender<Request>,
+    report: ReportFn,
 }
 
 /// A change in a member's state.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Notice {
+pub struct MemberEvent {
     /// The name under which it was added.
     pub member: String,
     /// Its new state.
-    pub fate: MemberState,
+    pub state: MemberState,
 }
 
-/// States of a member: first it begins, then it is completed or fails.
+/// States of a member: first it starts, then it is completed or fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MemberState {
     /// It gets the frames from now on.
-    Began,
+    Started,
     /// It is complete.
     Completed {
         /// Number of frames it received.
@@ -47,11 +47,11 @@ pub enum MemberState {
 /// The run has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pictures have ended")]
-pub struct Over;
+pub struct RunEnded;
 
-type Report = Arc<dyn Fn(Notice) + Send + Sync>;
+type ReportFn = Arc<dyn Fn(MemberEvent) + Send + Sync>;
 
-/// Requests of a switchboard to its tee.
+/// Requests of a control to its tee.
 pub(super) enum Request {
     Add(NewMember),
     Remove(String),
@@ -67,27 +67,27 @@ impl Request {
     }
 }
 
-impl Switchboard {
-    /// Creates a switchboard, and the receiver of its requests. `report` is called for each state change of a member,
+impl TeeControl {
+    /// Creates a control, and the receiver of its requests. `report` is called for each state change of a member,
     /// also on the thread of the frames: it must be quick.
-    pub(super) fn new(report: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Receiver<Request>) {
-        let (to, requests) = mpsc::channel();
-        (Self { to, report: Arc::new(report) }, requests)
+    pub(super) fn new(report: impl Fn(MemberEvent) + Send + Sync + 'static) -> (Self, Receiver<Request>) {
+        let (request_sender, requests) = mpsc::channel();
+        (Self { request_sender, report: Arc::new(report) }, requests)
     }
 
     /// Adds a sink. A member with the same name is completed first.
     ///
     /// # Errors
     /// The run has ended: the sink was aborted, which is reported as well.
-    pub fn add(&self, name: &str, sink: Box<dyn Sink>) -> Result<(), Over> {
+    pub fn add(&self, name: &str, sink: Box<dyn Sink>) -> Result<(), RunEnded> {
         let reporter = Reporter { name: name.into(), is_reported: false, report: Arc::clone(&self.report) };
-        self.to.send(Request::Add(NewMember { sink, reporter })).map_err(|_| Over)
+        self.request_sender.send(Request::Add(NewMember { sink, reporter })).map_err(|_| RunEnded)
     }
 
     /// Removes the member with this name and completes it; does nothing if it does not exist.
     pub fn remove(&self, name: &str) {
         // Without a run, there are no members.
-        let _ = self.to.send(Request::Remove(name.into()));
+        let _ = self.request_sender.send(Request::Remove(name.into()));
     }
 }
 
@@ -101,7 +101,7 @@ impl NewMember {
     /// Starts its thread; `None` if the system refuses the thread, and the member is reported as failed.
     pub fn start(self) -> Option<OutputThread> {
         let Self { sink, reporter } = self;
-        reporter.report(MemberState::Began);
+        reporter.report(MemberState::Started);
         OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| reporter.report_end(frames, outcome)).ok()
     }
 }
@@ -111,12 +111,12 @@ struct Reporter {
     name: String,
     /// Whether its end was reported.
     is_reported: bool,
-    report: Report,
+    report: ReportFn,
 }
 
 impl Reporter {
-    fn report(&self, fate: MemberState) {
-        (self.report)(Notice { member: self.name.clone(), fate });
+    fn report(&self, state: MemberState) {
+        (self.report)(MemberEvent { member: self.name.clone(), state });
     }
 
     /// Reports how a member ended that received `frames` frames.

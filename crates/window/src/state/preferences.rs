@@ -6,13 +6,13 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 /// Valid text scales; 1 is the default.
-pub const TEXT_SCALES: RangeInclusive<f32> = 0.75..=3.0;
+pub const TEXT_SCALE_RANGE: RangeInclusive<f32> = 0.75..=3.0;
 
 /// Persistent preferences of the user.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
-pub struct Habits {
-    /// Scale of text and controls, within [`TEXT_SCALES`].
+pub struct Preferences {
+    /// Scale of text and controls, within [`TEXT_SCALE_RANGE`].
     pub text_scale: f32,
     /// Whether bindings of single letters, digits and signs (without Ctrl) are enabled.
     pub single_keys: bool,
@@ -24,7 +24,7 @@ pub struct Habits {
     pub sections: BTreeMap<String, bool>,
 }
 
-impl Default for Habits {
+impl Default for Preferences {
     fn default() -> Self {
         Self {
             text_scale: 1.0,
@@ -36,16 +36,16 @@ impl Default for Habits {
     }
 }
 
-impl Habits {
-    /// Sets the text scale, clamped to [`TEXT_SCALES`].
+impl Preferences {
+    /// Sets the text scale, clamped to [`TEXT_SCALE_RANGE`].
     pub fn set_text_scale(&mut self, scale: f32) {
         if scale.is_finite() {
-            self.text_scale = scale.clamp(*TEXT_SCALES.start(), *TEXT_SCALES.end());
+            self.text_scale = scale.clamp(*TEXT_SCALE_RANGE.start(), *TEXT_SCALE_RANGE.end());
         }
     }
 
     /// Returns the settings with every value in range: a file may contain anything.
-    pub fn checked(mut self) -> Self {
+    pub fn into_valid(mut self) -> Self {
         let scale = std::mem::replace(&mut self.text_scale, 1.0);
         self.set_text_scale(scale);
         self

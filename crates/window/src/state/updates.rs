@@ -15,8 +15,8 @@ impl State {
             Update::Presets(presets) => self.presets = presets,
             Update::Controls(controls) => self.controls = controls,
             Update::Camera(camera) => self.set_camera(camera),
-            Update::Offered(name) => return self.open(name).pop(),
-            Update::Behind(behind) => {
+            Update::Offered(name) => return self.open_source(name).pop(),
+            Update::Background(behind) => {
                 return self.set_look(Look { background: behind, ..self.look.clone() }, None).pop();
             }
             Update::Outputs(outputs) => {
@@ -25,10 +25,10 @@ impl State {
                 // Without outputs there is nothing to confirm any more.
                 self.closing &= !self.outputs.is_empty();
             }
-            Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
-            Update::Kept(folder) => self.kept_in = Some(folder),
+            Update::RecordedBytes(bytes) => self.recorded_bytes = Some(bytes),
+            Update::SavedIn(folder) => self.saved_in = Some(folder),
             Update::Note(text) => self.note(text),
-            Update::Trouble(text) => self.trouble = Some(text),
+            Update::OutputFailure(text) => self.output_failure = Some(text),
         }
         None
     }
@@ -36,25 +36,25 @@ impl State {
     /// Sets the source, and adapts the view and the look to it.
     fn set_source(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
-            self.meters.restart();
+            self.meters.clear_recent();
             self.source_name.clone_from(&running.name);
         }
         self.source = source;
         if self.shown == Shown::Depth && !self.may_have_depth() {
             self.shown = Shown::Picture;
-            self.note(self.no_depth());
+            self.note(self.no_depth_advice());
         }
         let chosen = match &self.source {
             // Restores a portrait effect that a source without depth replaced, unless the user chose another effect
             // since.
             Source::Running(running) if running.has_depth => {
-                let chosen = self.chosen_look();
+                let chosen = self.look_as_chosen();
                 self.effect_replaced = false;
                 chosen
             }
             _ => self.look.clone(),
         };
-        if self.known().is_relative && self.may_have_depth() && chosen.metric_setting().is_some() {
+        if self.source_depth().is_relative && self.may_have_depth() && chosen.metric_setting().is_some() {
             self.note(NO_METRES);
         }
         let look = self.adapt_look(chosen);

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Fullscreen;
 
-use super::hold::still;
+use super::held_frame::capture_still;
 use super::{App, control};
 use crate::panel::{self, Canvas};
 use crate::present::{Area, Controls, Drawing, Image};
@@ -48,7 +48,7 @@ impl App {
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
-        let room = panel::room_px(&self.ctx);
+        let room = panel::picture_area_px(&self.ctx);
         let (area, part) = gfx.area(size, room, self.state.zoom, self.state.mirror);
         let canvas = Canvas { area, size, part };
         let input = gfx.input.take_egui_input(&gfx.window);
@@ -68,49 +68,50 @@ impl App {
             gfx.window.request_redraw();
         }
         // A change of the panel's size moves the picture and its overlays: lay out again.
-        if panel::room_px(&self.ctx) != room {
+        if panel::picture_area_px(&self.ctx) != room {
             self.layout_at = Some(self.laid_out);
             gfx.window.request_redraw();
         }
         if !actions.is_empty() {
             // Lays out again immediately, to show their effect.
             self.layout_at = Some(self.laid_out);
-            actions.into_iter().for_each(|action| self.perform(action, events));
+            actions.into_iter().for_each(|action| self.perform_action(action, events));
             self.request_redraw();
         }
     }
 
     /// Applies an action to the state, and carries out its requests or forwards them to the session.
-    pub(super) fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
+    pub(super) fn perform_action(&mut self, action: Action, events: &ActiveEventLoop) {
         for request in self.state.apply(action) {
             match request {
-                Request::Snapshot => self.snapshot(),
-                Request::CopyCommand => self.session.copy(self.state.switches()),
+                Request::Snapshot => self.save_snapshot(),
+                Request::CopyCommand => self.session.copy_command(self.state.cli_options()),
                 Request::FullScreen(on) => {
                     if let Some(gfx) = &self.gfx {
                         gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
                     }
                 }
-                Request::Seek(place) => self.seek(place),
-                Request::Off(off) => self.switch_off(off),
+                Request::Seek(frame) => self.seek_to_frame(frame),
+                Request::Off(off) => self.set_off(off),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
                     // Before the look, so that it is not applied to a photo's picture without depth.
-                    self.state.settled &= !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
-                    self.update_held();
+                    self.state.shows_final_photo &=
+                        !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
+                    self.update_held_frame();
                     self.session.send(Request::Look(look));
                     self.update_settings();
                 }
                 other => self.session.send(other),
             }
         }
-        self.update_wanted();
-        self.update_held();
+        self.update_output_request();
+        self.update_held_frame();
         self.update_watch();
     }
 
     /// Sets where the pipeline must deliver pictures. They are read back from the GPU only for uses other than drawing.
-    pub(super) fn update_wanted(&self) {
+    pub(super) fn update_output_request(&self) {
         let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
         let used_in_memory =
             self.state.frozen || self.state.is_photo() || self.snapshot_due || !self.state.outputs.is_empty();
@@ -125,19 +126,19 @@ impl App {
 
     /// Saves the displayed frame. If it is only on the GPU, was blurred between two looks (no settings could reproduce
     /// it), or reuses an earlier frame's depth, saves the next frame without these defects instead.
-    pub(super) fn snapshot(&mut self) {
+    pub(super) fn save_snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
         let is_running = matches!(self.state.source, Source::Running(_));
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
         let (between, depth_held) = (view.is_transitional, view.trace.is_depth_reused);
-        let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
+        let is_frozen = self.state.is_picture_static() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
-        self.update_wanted();
-        let Some(still) = still(view, 0).filter(|_| !self.snapshot_due) else { return };
+        self.update_output_request();
+        let Some(still) = capture_still(view, 0).filter(|_| !self.snapshot_due) else { return };
         let request = self.remote_control.as_mut().and_then(control::RemoteControl::take_request);
-        self.session.save(still, SaveOptions { with_sources: self.state.habits.keep_sources, request });
+        self.session.save_frame(still, SaveOptions { with_sources: self.state.preferences.keep_sources, request });
     }
 
     /// Presents the frame, or the selected view of it, below the controls of the last layout.
@@ -157,7 +158,7 @@ impl App {
         // While off, the window shows the same card as the outputs.
         if self.state.off && self.card.size() != size {
             self.card = ColorImage::new(size.0, size.1);
-            card::draw(&mut self.card);
+            card::draw_card(&mut self.card);
         }
         let none = if self.state.off { &self.card } else { &self.blank };
         let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(none);
@@ -166,7 +167,7 @@ impl App {
         // If nothing was blurred, before and after are identical.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
-        let (area, part) = gfx.area(size, panel::room_px(&self.ctx), self.state.zoom, *mirror);
+        let (area, part) = gfx.area(size, panel::picture_area_px(&self.ctx), self.state.zoom, *mirror);
         let drawing = Drawing {
             area: if self.view.is_some() || self.state.off { area } else { Area::default() },
             part,
@@ -183,7 +184,7 @@ impl App {
             return events.exit();
         }
         if drawn_on_gpu && !gfx.presenter.has_device() {
-            self.update_wanted();
+            self.update_output_request();
             self.state.note(GPU_FAILED);
         }
         let now_ns = self.clock.now_ns();

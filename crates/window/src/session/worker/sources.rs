@@ -3,8 +3,8 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use super::Host;
-use crate::services::Browse;
+use super::SessionWorker;
+use crate::services::PathKind;
 use crate::session::Command;
 use crate::state::{Request, Update};
 use bokehcam::files::whole;
@@ -13,14 +13,14 @@ use bokehcam::look::BackgroundSetting;
 /// Interval of checks for new devices and of the recording's size.
 const CHECK_PERIOD: Duration = Duration::from_secs(1);
 
-impl Host {
+impl SessionWorker {
     /// Waits for the next command, and meanwhile checks for device changes. `None` if all senders are gone.
     pub(super) fn next_command(&mut self, inbox: &mpsc::Receiver<Command>) -> Option<Command> {
         loop {
             match inbox.recv_timeout(CHECK_PERIOD) {
                 Ok(command) => return Some(command),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    self.report_size();
+                    self.report_recording_size();
                     self.check_devices();
                 }
                 Err(mpsc::RecvTimeoutError::Disconnected) => return None,
@@ -29,46 +29,46 @@ impl Host {
     }
 
     /// Reports the current size of the recording.
-    fn report_size(&self) {
-        let recording = self.start.outputs.iter().find(|output| !output.is_camera);
+    fn report_recording_size(&self) {
+        let recording = self.config.outputs.iter().find(|output| !output.is_camera);
         let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
-        bytes.into_iter().for_each(|bytes| self.events.send_update(Update::Recorded(bytes)));
+        bytes.into_iter().for_each(|bytes| self.events.send_update(Update::RecordedBytes(bytes)));
     }
 
     pub(super) fn report_choices(&mut self) {
-        let sources = self.start.services.sources();
-        let virtual_cameras = self.start.services.virtual_cameras();
+        let sources = self.config.services.list_sources();
+        let virtual_cameras = self.config.services.list_virtual_cameras();
         self.events.send_update(Update::Choices { sources, virtual_cameras });
-        self.events.send_update(Update::Presets(self.start.services.settings().presets()));
+        self.events.send_update(Update::Presets(self.config.services.settings().presets()));
     }
 
     /// Reports device changes, and reopens a missing source that has come back.
     fn check_devices(&mut self) {
-        if !self.start.services.devices_changed() {
+        if !self.config.services.have_devices_changed() {
             return;
         }
         self.report_choices();
-        let is_there = self.start.services.sources().iter().any(|choice| choice.name == self.start.source);
-        if self.live.is_none() && is_there && self.start.source.starts_with("/dev/") {
-            self.open();
+        let is_there = self.config.services.list_sources().iter().any(|choice| choice.name == self.config.source);
+        if self.pipeline.is_none() && is_there && self.config.source.starts_with("/dev/") {
+            self.open_source();
         }
     }
 
     /// Reports an offered source as valid, or else why not; the current source continues.
-    pub(super) fn offer(&self, name: String) {
-        match self.start.services.check(&name) {
+    pub(super) fn check_offer(&self, name: String) {
+        match self.config.services.check_source_name(&name) {
             Ok(()) => self.events.send_update(Update::Offered(name)),
             Err(line) => self.events.note(line),
         }
     }
 
     /// Opens a file chooser on its own thread.
-    pub(super) fn browse(&self, what: Browse) {
+    pub(super) fn open_file_chooser(&self, what: PathKind) {
         let (commands, events) = (self.commands.clone(), self.events.clone());
-        let pick = self.start.services.browse(what);
-        let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
-            Ok(Some(file)) if what == Browse::Behind => match BackgroundSetting::Image(file.into()).load() {
-                Ok(behind) => events.send_update(Update::Behind(behind)),
+        let choose_path = self.config.services.create_file_chooser(what);
+        let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match choose_path() {
+            Ok(Some(file)) if what == PathKind::Background => match BackgroundSetting::Image(file.into()).load() {
+                Ok(behind) => events.send_update(Update::Background(behind)),
                 Err(error) => events.note(error.to_string()),
             },
             Ok(Some(name)) => drop(commands.send(Command::Request(Request::Offer(name)))),
@@ -81,9 +81,9 @@ impl Host {
     }
 
     /// Reopens the camera with another frame size and rate.
-    pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) {
-        self.start.services.choose_mode(&self.start.source, size, fps);
-        self.stop();
-        self.open();
+    pub(super) fn set_camera_mode(&mut self, size: (u32, u32), fps: f64) {
+        self.config.services.set_mode(&self.config.source, size, fps);
+        self.stop_run();
+        self.open_source();
     }
 }

@@ -15,14 +15,14 @@ pub enum DepthMethod {
     /// Person segmentation by a network.
     Person,
     /// Person segmentation and monocular depth by networks.
-    PersonAndDistance,
+    PersonAndMonoDepth,
     /// A background plate captured at the start.
     Plate,
 }
 
 impl DepthMethod {
     /// Returns the corresponding choice of `--depth`, with the installed networks.
-    pub fn choice(self) -> DepthChoice {
+    pub fn to_depth_choice(self) -> DepthChoice {
         let installed = Some(NetworkFile::Installed);
         match self {
             Self::Measured => DepthChoice::Recorded,
@@ -30,7 +30,7 @@ impl DepthMethod {
             Self::Person => {
                 DepthChoice::SingleCamera(SingleCameraDepth { matte: installed, ..SingleCameraDepth::default() })
             }
-            Self::PersonAndDistance => DepthChoice::SingleCamera(SingleCameraDepth {
+            Self::PersonAndMonoDepth => DepthChoice::SingleCamera(SingleCameraDepth {
                 matte: installed.clone(),
                 mono: installed,
                 ..SingleCameraDepth::default()
@@ -47,26 +47,26 @@ impl DepthMethod {
         (Self::Measured, "recorded"),
         (Self::Stereo, "stereo"),
         (Self::Person, "matte"),
-        (Self::PersonAndDistance, "matte,mono"),
+        (Self::PersonAndMonoDepth, "matte,mono"),
         (Self::Plate, "plate"),
     ];
 
     /// Returns the value of `--depth`, including the networks that complement a plate.
-    pub fn flag(self) -> String {
-        match self.choice() {
+    pub fn depth_option(self) -> String {
+        match self.to_depth_choice() {
             DepthChoice::SingleCamera(chosen) => chosen.kind_names(),
             _ => self.to_string(),
         }
     }
 
     /// Returns the method that provided a source's depth; `None` without depth.
-    pub fn of(depth_from: DepthOrigin, networks: &SingleCameraDepth, has_plate: bool) -> Option<Self> {
+    pub fn from_origin(depth_from: DepthOrigin, networks: &SingleCameraDepth, has_plate: bool) -> Option<Self> {
         match depth_from {
             DepthOrigin::Nothing => None,
             DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => Some(Self::Measured),
             DepthOrigin::Stereo => Some(Self::Stereo),
             _ if has_plate => Some(Self::Plate),
-            DepthOrigin::Networks if networks.mono.is_some() => Some(Self::PersonAndDistance),
+            DepthOrigin::Networks if networks.mono.is_some() => Some(Self::PersonAndMonoDepth),
             DepthOrigin::Networks => Some(Self::Person),
             DepthOrigin::Plate => Some(Self::Plate),
         }
@@ -75,7 +75,7 @@ impl DepthMethod {
 
 impl fmt::Display for DepthMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::NAMES.iter().find(|(way, _)| way == self).map_or("", |(_, name)| name);
+        let name = Self::NAMES.iter().find(|(depth_method, _)| depth_method == self).map_or("", |(_, name)| name);
         f.write_str(name)
     }
 }
@@ -83,8 +83,8 @@ impl fmt::Display for DepthMethod {
 impl FromStr for DepthMethod {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let way = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(way, _)| *way);
-        way.ok_or_else(|| {
+        let depth_method = Self::NAMES.iter().find(|(_, name)| *name == text).map(|(depth_method, _)| *depth_method);
+        depth_method.ok_or_else(|| {
             let names = Self::NAMES.map(|(_, name)| name).join(", ");
             format!("there is no source of depth '{text}': use one of {names}")
         })

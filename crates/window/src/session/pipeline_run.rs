@@ -6,27 +6,27 @@ use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::super::services::{Opened, Services};
+use super::super::services::{OpenedSource, Services};
 use super::super::state::{Output, Running, Source};
-use super::{EventSender, SessionEvent, Start};
+use super::{EventSender, SessionConfig, SessionEvent};
 use bokehcam::clock::Clock;
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
 use bokehcam::look::{Look, SourceDepth};
 use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Pace, PipelineError, Run};
 use bokehcam::sink::Sink;
-use bokehcam::sink::switch::Notice;
-use bokehcam::sink::{Shutter, Switchboard, Tee};
+use bokehcam::sink::tee_control::MemberEvent;
+use bokehcam::sink::{Shutter, Tee, TeeControl};
 use bokehcam::source::{Kind, SourceName};
 use bokehcam::stats::Report;
 
 /// A running pipeline, and the handles that control it.
-pub(super) struct Live {
+pub(super) struct PipelineRun {
     pub size: (u32, u32),
     pub period_ns: u64,
-    known: SourceDepth,
+    source_depth: SourceDepth,
     changes: ChangeSender,
-    board: Switchboard,
+    tee_control: TeeControl,
     pub stop: Arc<AtomicBool>,
     /// Progress of the background plate, if depth comes from it.
     pub guide: Option<Arc<Guide>>,
@@ -34,42 +34,43 @@ pub(super) struct Live {
 }
 
 /// The pipeline adapts the quality level to real time, because the window is live.
-const ADAPTIVE: bool = true;
+const ADAPTIVE_QUALITY: bool = true;
 
-impl Live {
-    /// Starts a run. `wrote` is called with events of its outputs, `ended` once with the run's result.
+impl PipelineRun {
+    /// Starts a run. `on_output_event` is called with events of its outputs, `ended` once with the run's result.
     ///
     /// # Errors
     /// Returns a one-line message if the executor or the thread cannot be created.
-    pub(super) fn begin(
-        opened: Opened,
-        start: &mut Start,
+    pub(super) fn start(
+        opened: OpenedSource,
+        config: &mut SessionConfig,
         events: &EventSender,
-        wrote: impl Fn(Notice) + Send + Sync + 'static,
+        on_output_event: impl Fn(MemberEvent) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, source, has_depth, ways, way, camera: facts, .. } = opened;
+        let OpenedSource { name, source, has_depth, depth_methods, depth_method, camera, .. } = opened;
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
-        let known = SourceDepth { has_depth, is_relative: facts.is_relative, size: info.size };
-        let look = start.look.for_source(known);
-        let (blurring, changes) =
-            BlurSetup::create(look, (info.size, ADAPTIVE), |settings| start.services.executor(settings, info.size))?;
+        let source_depth = SourceDepth { has_depth, is_relative: camera.is_relative, size: info.size };
+        let look = config.look.for_source(source_depth);
+        let (blurring, changes) = BlurSetup::create(look, (info.size, ADAPTIVE_QUALITY), |settings| {
+            config.services.create_executor(settings, info.size)
+        })?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
-        let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
+        let (budget_ns, threads) = (config.budget_ns.unwrap_or(info.period_ns), config.threads);
         // Outputs can be added and removed during the run; the shutter withholds pictures from all of them.
-        let (switch, board) = Tee::switched("window", wrote);
+        let (tee, tee_control) = Tee::with_control("window", on_output_event);
         let period = Duration::from_nanos(info.period_ns);
-        let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
-        let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
-        *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
+        let (demand, off) = (config.demand.clone(), Arc::clone(&config.off));
+        let (sink, shutter) = Shutter::new(Box::new(tee), info.size, period, demand, Clock::system(), off);
+        *config.shutter.lock().unwrap_or_else(PoisonError::into_inner) = Some(shutter);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), start.keep_going);
-        let (output_request, demand) = (Arc::clone(&start.output_request), start.demand.clone());
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), config.keep_going);
+        let (output_request, demand) = (Arc::clone(&config.output_request), config.demand.clone());
         // Before the thread starts, so that the window can receive the first frame.
-        events.send(SessionEvent::Views(views, guide.clone(), seeker));
+        events.send(SessionEvent::RunStarted(views, guide.clone(), seeker));
         let run = move || {
             pipeline::run(Run {
                 threads,
@@ -102,21 +103,30 @@ impl Live {
             is_live: info.live,
             kind,
             depth_from,
-            ways,
-            way,
+            depth_methods,
+            depth_method,
             executor,
             budget_ns,
         });
-        let live = Self { size: info.size, period_ns: info.period_ns, known, changes, board, stop, guide, thread };
-        Ok((live, source))
+        let pipeline_run = Self {
+            size: info.size,
+            period_ns: info.period_ns,
+            source_depth,
+            changes,
+            tee_control,
+            stop,
+            guide,
+            thread,
+        };
+        Ok((pipeline_run, source))
     }
 
     /// Returns the look as far as the source supports it.
-    pub(super) fn effective(&self, look: &Look) -> Look {
-        look.for_source(self.known)
+    pub(super) fn adapt_look(&self, look: &Look) -> Look {
+        look.for_source(self.source_depth)
     }
 
-    /// Blurs with this look from now on, which the source must [support](Self::effective); its frames carry `number`.
+    /// Blurs with this look from now on, which the source must [support](Self::adapt_look); its frames carry `number`.
     ///
     /// # Errors
     /// Returns a one-line message if the executor cannot be created. The previous look stays active.
@@ -124,7 +134,7 @@ impl Live {
         let size = self.size;
         self.changes.switch_look(look, number, |settings| {
             let began = Instant::now();
-            let bokeh = services.executor(settings, size)?;
+            let bokeh = services.create_executor(settings, size)?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());
             Ok(bokeh)
         })
@@ -132,13 +142,13 @@ impl Live {
 
     /// Adds an output to the run.
     pub(super) fn add_output(&self, output: &Output, sink: Box<dyn Sink>) {
-        // A run that has ended rejects the sink and reports that through `wrote`.
-        let _ = self.board.add(&output.name, sink);
+        // A run that has ended rejects the sink and reports that through `on_output_event`.
+        let _ = self.tee_control.add(&output.name, sink);
     }
 
     /// Removes an output from the run, which completes its file.
     pub(super) fn remove_output(&self, output: &Output) {
-        self.board.remove(&output.name);
+        self.tee_control.remove(&output.name);
     }
 
     /// Stops the run and waits for it. Returns its report.
