@@ -121,7 +121,7 @@ impl Shutter {
         write: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
     ) -> Result<ControlFlow<()>, SinkError> {
         let closed = self.update_demand();
-        let time_ns = self.to_sink_time_ns(time_ns);
+        let time_ns = self.convert_time_ns(time_ns);
         if closed {
             return self.send_card(time_ns);
         }
@@ -183,7 +183,7 @@ impl Shutter {
     }
 
     /// Converts the source's time to the sink's: later than the previous one.
-    fn to_sink_time_ns(&mut self, time_ns: u64) -> u64 {
+    fn convert_time_ns(&mut self, time_ns: u64) -> u64 {
         let period_ns = self.period.as_nanos() as u64;
         match self.last_ns {
             Some(last_ns) if self.shows_card && time_ns + self.offset_ns <= last_ns => {

@@ -114,7 +114,7 @@ fn render_situation(situation: Situation) -> RenderedSituation {
 
 /// Returns the depth of every source, and the exact one.
 fn estimate_depths(rendered: &RenderedSituation) -> Vec<(&'static str, DepthMap)> {
-    let [matte, mono] = [Task::Matte, Task::Mono].map(model);
+    let [matte, mono] = [Task::Matte, Task::Mono].map(find_model);
     let networks = |matte: &Option<PathBuf>, mono: &Option<PathBuf>| {
         SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default(), Runtime::Auto).ok()
     };

@@ -222,7 +222,7 @@ fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
         format!("# depth maps, 16-bit PNG, {DEPTH_UNITS_PER_METRE} units per metre\n# timestamp filename\n");
     let mut pairs = String::new();
     let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
-    for frame in 0..frames(scene) {
+    for frame in 0..frame_count(scene) {
         scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, thread_count(), &mut picture, &mut map);
         folder.write_or_check_color(&format!("rgb/{frame:06}.png"), &picture)?;
         folder.write_or_check_gray16(&format!("depth/{frame:06}.png"), &map, |z_m| z_m * DEPTH_UNITS_PER_METRE)?;
