@@ -2,7 +2,7 @@
 
 use egui::{Event, Key, Modifiers};
 
-use super::state::{Action, Shown, Source, State, tweak};
+use super::state::{Action, Source, State, ViewMode, tweak};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Look;
 
@@ -84,8 +84,8 @@ fn edit_look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)
 }
 
 /// Toggles between `shown` and the normal picture.
-fn toggle_view(state: &State, shown: Shown) -> Option<Action> {
-    Some(Action::Show(if state.shown == shown { Shown::Picture } else { shown }))
+fn toggle_view(state: &State, shown: ViewMode) -> Option<Action> {
+    Some(Action::Show(if state.shown == shown { ViewMode::Picture } else { shown }))
 }
 
 /// Returns the direction of a pair of opposite keys: -1 for the first chord of the pair, 1 for the second.
@@ -245,9 +245,11 @@ pub const GROUPS: [Group; 5] = [
                 },
             ),
             bind_once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
-            bind_once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, Shown::Depth)),
-            bind_once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, Shown::Coc)),
-            bind_once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| toggle_view(state, Shown::Bins)),
+            bind_once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, ViewMode::Depth)),
+            bind_once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, ViewMode::Coc)),
+            bind_once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| {
+                toggle_view(state, ViewMode::Bins)
+            }),
         ],
     },
     Group {

@@ -23,7 +23,7 @@ pub fn measure() {
     let area = Area { x: 0, y: 0, width: SIZE.0, height: SIZE.1 };
     let shown = |picture| {
         let (picture, background) = (Image::Memory(picture), [0; 3]);
-        Drawing { area, picture, part: None, before: None, mirror: false, stale: false, background }
+        Drawing { area, picture, visible_region: None, before: None, mirror: false, stale: false, background }
     };
     let cases: [(&str, Drawing); 5] = [
         ("pixel for pixel", shown(&same)),

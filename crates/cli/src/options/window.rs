@@ -7,7 +7,7 @@ use clap::builder::BoolishValueParser;
 
 use crate::options::named_value_parser;
 use bokehcam::look::number::in_range_parser;
-use bokehcam_window::state::{Shown, TEXT_SCALE_RANGE};
+use bokehcam_window::state::{TEXT_SCALE_RANGE, ViewMode};
 use bokehcam_window::window::ThemeChoice;
 
 /// What a window shows first; all of it can be changed there.
@@ -15,8 +15,8 @@ use bokehcam_window::window::ThemeChoice;
 #[command(next_help_heading = "Window")]
 pub struct Window {
     /// View of each frame
-    #[arg(long, value_parser = named_value_parser::<Shown>(), value_name = "WHAT", default_value = "picture")]
-    pub show: Shown,
+    #[arg(long, value_parser = named_value_parser::<ViewMode>(), value_name = "WHAT", default_value = "picture")]
+    pub show: ViewMode,
     /// Show the picture before the blur, left of this fraction of its width
     #[arg(long, value_name = "FRACTION", value_parser = in_range_parser(0.0..=1.0))]
     pub split: Option<f32>,

@@ -61,9 +61,9 @@ fn switches_toggle() {
         (Key::F1, |state| state.help),
         (Key::Questionmark, |state| state.help),
         (Key::B, |state| state.split.is_some()),
-        (Key::D, |state| state.shown == Shown::Depth),
-        (Key::C, |state| state.shown == Shown::Coc),
-        (Key::N, |state| state.shown == Shown::Bins),
+        (Key::D, |state| state.shown == ViewMode::Depth),
+        (Key::C, |state| state.shown == ViewMode::Coc),
+        (Key::N, |state| state.shown == ViewMode::Bins),
         (Key::V, |state| state.recording().is_some()),
         (Key::O, |state| state.virtual_camera().is_some()),
     ] {

@@ -3,7 +3,7 @@
 use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 
 use super::marks::{self, TiltHandle};
-use super::state::{Action, Shown, State, tweak};
+use super::state::{Action, State, ViewMode, tweak};
 use super::viewport::{Viewport, fit_scale};
 use crate::texts::tr;
 use bokehcam::depth::focus::FocusRule;
@@ -46,7 +46,8 @@ impl Gestures {
         let response = ui.interact(viewport.visible, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, tr("Picture: a click focuses there")));
         let line = drag_split_line(ui, state, &viewport);
-        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.controls_hidden;
+        let is_tilt =
+            state.look.effect == Effect::TiltShift && state.shown == ViewMode::Picture && !state.controls_hidden;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
         if !on_line && !is_wake_touch {
             self.handle_click(&response, state, &viewport, actions);
@@ -140,10 +141,10 @@ impl Gestures {
         }
         if let Some(at) = state.split {
             let after = match state.shown {
-                Shown::Picture => "After",
-                Shown::Depth => "Depth",
-                Shown::Coc => "Blur radius",
-                Shown::Bins => "Layers",
+                ViewMode::Picture => "After",
+                ViewMode::Depth => "Depth",
+                ViewMode::Coc => "Blur radius",
+                ViewMode::Bins => "Layers",
             };
             marks::draw_split(&painter, viewport, at, is_line_held, after);
         }

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stro
 
 use super::state::State;
 use super::theme::{Colors, GAP, PAD, card_frame};
-use super::views::{BIN_COLORS, Legend, depth_fraction, diverging, perceptual};
+use super::views::{BIN_COLORS, Legend, depth_fraction, diverging_color, viridis};
 use crate::texts::{tr, tr_with};
 
 const WIDTH: f32 = 260.0;
@@ -42,7 +42,7 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
     match legend {
         Legend::Depth { near_m, far_m } => {
             title(if state.source_depth().is_relative { "Depth: far to near" } else { "Depth in metres" });
-            draw_ramp(painter, bar, |fraction| perceptual()[(fraction * 255.0) as usize]);
+            draw_ramp(painter, bar, |fraction| viridis()[(fraction * 255.0) as usize]);
             let in_metres = !state.source_depth().is_relative;
             for metres in round_tick_depths(near_m, far_m).into_iter().filter(|_| in_metres) {
                 let x = bar.left() + depth_fraction(metres, near_m, far_m).clamp(0.0, 1.0) * bar.width();
@@ -51,7 +51,7 @@ pub fn show(ui: &Ui, state: &State, above: f32) {
         }
         Legend::Coc { max_px } => {
             title("Blur radius in pixels");
-            draw_ramp(painter, bar, |fraction| diverging(2.0 * fraction - 1.0));
+            draw_ramp(painter, bar, |fraction| diverging_color(2.0 * fraction - 1.0));
             draw_hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
             let max_radius = format!("{max_px:.0}");
             let [in_front, behind] = ["{} in front", "{} behind"].map(|text| tr_with(text, &[&max_radius]));

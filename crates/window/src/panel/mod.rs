@@ -32,7 +32,7 @@ use std::time::Duration;
 
 use egui::{Context, Event, Id, Ui, Vec2};
 
-use super::present::{Area, Part};
+use super::present::{Area, VisibleRegion};
 use super::state::{Action, State};
 use super::{keys, meters, state, views};
 use canvas::Gestures;
@@ -90,7 +90,7 @@ pub struct Canvas {
     /// The picture's width and height in pixels.
     pub size: (u32, u32),
     /// The visible part of the zoomed picture.
-    pub part: Option<Part>,
+    pub visible_region: Option<VisibleRegion>,
 }
 
 impl Panel {

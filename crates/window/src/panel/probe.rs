@@ -3,7 +3,7 @@
 use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 
 use super::marks::draw_label;
-use super::state::{Shown, State};
+use super::state::{State, ViewMode};
 use super::viewport::Viewport;
 use crate::texts::{tr, tr_with};
 use crate::views::Probe;
@@ -16,7 +16,7 @@ const PERIOD_S: f32 = 0.2;
 /// view are shown, or Alt is held.
 pub fn probed_point(ui: &Ui, state: &State, viewport: &Viewport) -> Option<[f32; 2]> {
     let (at, alt) = ui.input(|input| (input.pointer.hover_pos(), input.modifiers.alt));
-    let is_wanted = alt || !state.controls_hidden && (state.instruments || state.shown != Shown::Picture);
+    let is_wanted = alt || !state.controls_hidden && (state.instruments || state.shown != ViewMode::Picture);
     let at = at.filter(|at| is_wanted && viewport.visible.contains(*at))?;
     // Not through the panel.
     let layer = ui.ctx().layer_id_at(at);

@@ -59,7 +59,7 @@ impl Window {
             ctx: egui::Context::default(),
             panel: Panel::default(),
             state,
-            canvas: Canvas { area, size: (1280, 720), part: None },
+            canvas: Canvas { area, size: (1280, 720), visible_region: None },
             size: Vec2::new(width as f32, height as f32),
             native: 1.0,
             time_s: 0.0,

@@ -35,9 +35,9 @@ impl Viewport {
         };
         let corner = (area.x as f32, area.y as f32);
         let visible = rect(corner, (area.width, area.height));
-        let whole = canvas.part.map_or(visible, |part| {
-            let corner = (corner.0 - part.at.0 as f32, corner.1 - part.at.1 as f32);
-            rect(corner, (canvas.size.0 * part.factor, canvas.size.1 * part.factor))
+        let whole = canvas.visible_region.map_or(visible, |region| {
+            let corner = (corner.0 - region.origin.0 as f32, corner.1 - region.origin.1 as f32);
+            rect(corner, (canvas.size.0 * region.factor, canvas.size.1 * region.factor))
         });
         Some(Self { rect: whole, visible, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
     }

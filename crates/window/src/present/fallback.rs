@@ -6,20 +6,22 @@ use bokehcam::compute::DevicePicture;
 use bokehcam::compute::with_fallback::WithFallback;
 
 /// Presents with a GPU, and after its first error with another presenter.
-pub struct Fallback<Other> {
+pub struct FallbackPresenter<CreateFallback> {
     /// The GPU presenter with its spare: a constructor, and a painter that always has the current controls.
-    presenter: WithFallback<Box<dyn Presenter>, (Other, Painter)>,
+    presenter: WithFallback<Box<dyn Presenter>, (CreateFallback, Painter)>,
     size: (u32, u32),
 }
 
-impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Fallback<Other> {
-    /// Creates a presenter that uses `first`, and after it fails the one that `other` creates.
-    pub fn new(first: Box<dyn Presenter>, other: Other) -> Self {
-        Self { presenter: WithFallback::new(first, (other, Painter::new())), size: (0, 0) }
+impl<CreateFallback: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> FallbackPresenter<CreateFallback> {
+    /// Creates a presenter that uses `first`, and after it fails the one that `create_fallback` creates.
+    pub fn new(first: Box<dyn Presenter>, create_fallback: CreateFallback) -> Self {
+        Self { presenter: WithFallback::new(first, (create_fallback, Painter::new())), size: (0, 0) }
     }
 }
 
-impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Presenter for Fallback<Other> {
+impl<CreateFallback: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Presenter
+    for FallbackPresenter<CreateFallback>
+{
     fn resize(&mut self, size: (u32, u32)) {
         self.size = size;
         self.presenter.worker_mut().resize(size);
@@ -34,8 +36,8 @@ impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Present
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
         let Self { presenter, size } = self;
-        let make = |_: &mut _, (other, painter): (Other, Painter)| {
-            let mut soft = other(painter)?;
+        let make = |_: &mut _, (create_fallback, painter): (CreateFallback, Painter)| {
+            let mut soft = create_fallback(painter)?;
             soft.resize(*size);
             Ok(soft)
         };
@@ -46,8 +48,8 @@ impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Present
         self.presenter.worker().supports(picture)
     }
 
-    fn has_device(&self) -> bool {
-        self.presenter.worker().has_device()
+    fn uses_gpu(&self) -> bool {
+        self.presenter.worker().uses_gpu()
     }
 }
 
@@ -78,7 +80,7 @@ mod tests {
             self.0 = self.0.checked_sub(1).ok_or_else(|| PresentError("device lost".to_owned()))?;
             Ok(())
         }
-        fn has_device(&self) -> bool {
+        fn uses_gpu(&self) -> bool {
             true
         }
     }
@@ -123,7 +125,7 @@ mod tests {
         let drawing = Drawing {
             area: Area { x: 0, y: 0, width: SIZE.0, height: SIZE.1 },
             picture: Image::Memory(&picture),
-            part: None,
+            visible_region: None,
             before: None,
             mirror: false,
             stale: false,
@@ -134,7 +136,7 @@ mod tests {
         let shown: Screen = Rc::new(RefCell::new(vec![0; PIXELS]));
         let screen = Rc::clone(&shown);
         let other = move |painter| Ok(Box::new(Soft(painter, screen)) as Box<dyn Presenter>);
-        let mut fallback = Fallback::new(Box::new(Gpu(2)), other);
+        let mut fallback = FallbackPresenter::new(Box::new(Gpu(2)), other);
         for presenter in [&mut painter as &mut dyn Presenter, &mut fallback] {
             presenter.resize(SIZE);
             presenter.set_controls(controls(true, 8.0));
@@ -142,9 +144,9 @@ mod tests {
             presenter.set_controls(controls(false, 30.0));
             presenter.present(&drawing).unwrap();
         }
-        assert!(fallback.has_device() && *shown.borrow() == [0; PIXELS]);
+        assert!(fallback.uses_gpu() && *shown.borrow() == [0; PIXELS]);
         fallback.present(&drawing).unwrap();
-        assert!(!fallback.has_device());
+        assert!(!fallback.uses_gpu());
         assert_eq!(*shown.borrow(), *expected.borrow(), "controls and picture");
         assert!(expected.borrow().contains(&0x00c8_1e5a), "with the controls");
         fallback.present(&drawing).unwrap();

@@ -5,14 +5,14 @@
 
 mod fallback;
 pub mod gpu;
-mod part;
 pub mod soft;
 mod split;
+mod visible_region;
 
 use std::sync::Arc;
 
-pub use part::{Part, enlarged, fitted};
 pub use split::Split;
+pub use visible_region::{VisibleRegion, fitted_area, zoomed_area};
 use winit::window::Window;
 
 use bokehcam::compute::device::{Device, DevicePicture};
@@ -52,7 +52,7 @@ pub struct Drawing<'a> {
     /// Area of the picture, which is scaled to fill it; the rest of the window is background.
     pub area: Area,
     /// Visible part of a zoomed picture, which fills the area with unscaled square pixels instead.
-    pub part: Option<Part>,
+    pub visible_region: Option<VisibleRegion>,
     pub picture: Image<'a>,
     /// A picture of the same size to show left of this fraction of the displayed width.
     pub before: Option<(&'a ColorImage, f32)>,
@@ -64,14 +64,14 @@ pub struct Drawing<'a> {
     pub background: [u8; 3],
 }
 
-/// Weights of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^BITS`.
-pub struct Tone;
+/// Weights of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^FRACTION_BITS`.
+pub struct StaleTone;
 
-impl Tone {
+impl StaleTone {
     /// Weights of red, green and blue: luma (BT.601) times 0.6.
-    pub const STALE_WEIGHTS: [u32; 3] = [11_757, 23_082, 4_483];
+    pub const LUMA_WEIGHTS: [u32; 3] = [11_757, 23_082, 4_483];
     /// Fractional bits of the weights.
-    pub const STALE_BITS: u32 = 16;
+    pub const FRACTION_BITS: u32 = 16;
 }
 
 /// Updated controls from egui.
@@ -105,7 +105,7 @@ pub trait Presenter {
     }
 
     /// Whether it draws with a GPU, so that blurred pictures may stay there.
-    fn has_device(&self) -> bool {
+    fn uses_gpu(&self) -> bool {
         false
     }
 }
@@ -120,16 +120,20 @@ pub struct PresentError(pub String);
 ///
 /// # Errors
 /// Fails if neither can draw to it.
-pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
+pub fn create_presenter(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
     if let Some(device) = device {
-        match gpu::Gpu::new(Arc::clone(&window), device) {
-            Ok(gpu) => return Ok(Box::new(fallback::Fallback::new(Box::new(gpu), |painter| soft(window, painter)))),
+        match gpu::GpuPresenter::new(Arc::clone(&window), device) {
+            Ok(gpu) => {
+                return Ok(Box::new(fallback::FallbackPresenter::new(Box::new(gpu), |painter| {
+                    create_cpu_presenter(window, painter)
+                })));
+            }
             Err(error) => tracing::info!("drawing on the CPU: {error}"),
         }
     }
-    soft(window, soft::Painter::new())
+    create_cpu_presenter(window, soft::Painter::new())
 }
 
-fn soft(window: Arc<Window>, painter: soft::Painter) -> Result<Box<dyn Presenter>, PresentError> {
-    Ok(Box::new(soft::Soft::new(window, painter)?))
+fn create_cpu_presenter(window: Arc<Window>, painter: soft::Painter) -> Result<Box<dyn Presenter>, PresentError> {
+    Ok(Box::new(soft::CpuPresenter::new(window, painter)?))
 }

@@ -44,7 +44,9 @@ impl<'a> Drawing<'a> {
     /// Returns the picture before the blur and the split; `None` without a split, or if their sizes differ.
     pub fn split(&self) -> Option<(&'a ColorImage, Split)> {
         let (before, fraction) = self.before.filter(|(before, _)| before.size() == self.picture.size())?;
-        let whole = self.part.map_or((self.area.width, 0), |part| (part.factor * self.picture.size().0, part.at.0));
+        let whole = self
+            .visible_region
+            .map_or((self.area.width, 0), |part| (part.factor * self.picture.size().0, part.origin.0));
         Some((before, Split::new(fraction, whole, self.area.width, self.area.height)))
     }
 }

@@ -46,7 +46,7 @@ impl HeldBlur {
     /// # Errors
     /// Returns a one-line message if the look needs depth that the frame lacks, or the executor cannot be created or
     /// fails.
-    pub fn blur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
+    pub fn reblur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
         let Still { number, images, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.for_frame(coc, None) } else { look.clone() };
         let size = images.color.size();
@@ -54,19 +54,20 @@ impl HeldBlur {
             BokehError::NoDepth => NO_DEPTH.to_owned(),
             error => error.to_string(),
         };
-        let (mut made, mut coc) = (images.clone(), *coc);
+        let (mut reblurred, mut coc) = (images.clone(), *coc);
         if fixed.coc_kind().is_some() {
-            let depth = made.depth.take().map(Depth::Final);
-            (coc, made.depth) = still::compute_coc_and_depth(&fixed, &mut made.color, depth).map_err(plain)?;
+            let depth = reblurred.depth.take().map(Depth::Final);
+            (coc, reblurred.depth) =
+                still::compute_coc_and_depth(&fixed, &mut reblurred.color, depth).map_err(plain)?;
         }
         self.blur.set_look(&fixed, (size, false), |settings| services.create_executor(settings, size))?;
-        if let Err(error) = self.blur.blur(&mut made, coc) {
+        if let Err(error) = self.blur.blur(&mut reblurred, coc) {
             self.blur = Blur::default();
             return Err(plain(error));
         }
-        // Keeps the original picture, without the virtual background composed into `made`.
-        let depth = images.depth.clone().filter(|_| made.depth.is_some());
-        let images = Images { color: images.color.clone(), depth, blurred: made.blurred };
+        // Keeps the original picture, without the virtual background composed into `reblurred`.
+        let depth = images.depth.clone().filter(|_| reblurred.depth.is_some());
+        let images = Images { color: images.color.clone(), depth, blurred: reblurred.blurred };
         Ok(Still { number: *number, images, coc, change, quality: self.blur.quality() })
     }
 }

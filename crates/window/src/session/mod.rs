@@ -94,11 +94,11 @@ pub struct SnapshotRequest {
 
 /// Result of a session.
 #[derive(Debug, Default)]
-pub struct Closed {
+pub struct SessionOutcome {
     /// Report of the last run.
     pub report: Option<Report>,
     /// One-line message of the first output that failed.
-    pub failed: Option<String>,
+    pub output_error: Option<String>,
 }
 
 /// Commands to the session's thread.
@@ -119,7 +119,7 @@ enum Command {
 pub struct Session {
     commands: mpsc::Sender<Command>,
     events: mpsc::Receiver<SessionEvent>,
-    thread: JoinHandle<Closed>,
+    thread: JoinHandle<SessionOutcome>,
 }
 
 impl Session {
@@ -169,7 +169,7 @@ impl Session {
     }
 
     /// Ends the run, completes all outputs, and waits for the thread.
-    pub fn close(self) -> Closed {
+    pub fn close(self) -> SessionOutcome {
         let _ = self.commands.send(Command::Close);
         // Disconnects first: events are not received any more.
         drop(self.events);

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 
 use super::pipeline_run::PipelineRun;
-use super::{Closed, Command, EventSender, SessionConfig, SessionEvent, held};
+use super::{Command, EventSender, SessionConfig, SessionEvent, SessionOutcome, held};
 use crate::services::CliOption;
 use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::files::user_folders as folders;
@@ -34,7 +34,7 @@ pub(super) struct SessionWorker {
     runs: u64,
     report: Option<Report>,
     /// Message of the first output that failed.
-    failed: Option<String>,
+    first_failure: Option<String>,
     /// Whether a run has ever started.
     has_started: bool,
     /// Recent looks of the current run with their change numbers, oldest first.
@@ -55,7 +55,7 @@ impl SessionWorker {
             pipeline: None,
             runs: 0,
             report: None,
-            failed: None,
+            first_failure: None,
             has_started: false,
             looks: VecDeque::new(),
             held: None,
@@ -63,7 +63,7 @@ impl SessionWorker {
     }
 
     /// Opens the source, then processes commands until it must close.
-    pub fn run(mut self, inbox: &mpsc::Receiver<Command>) -> Closed {
+    pub fn run(mut self, inbox: &mpsc::Receiver<Command>) -> SessionOutcome {
         self.report_choices();
         self.recover_recordings();
         self.open_source();
@@ -99,14 +99,14 @@ impl SessionWorker {
     }
 
     /// Ends the run, and processes the final events of its outputs.
-    fn close(mut self, inbox: &mpsc::Receiver<Command>) -> Closed {
+    fn close(mut self, inbox: &mpsc::Receiver<Command>) -> SessionOutcome {
         self.stop_run();
         for command in inbox.try_iter() {
             if let Command::OutputEvent(run, notice) = command {
                 self.handle_output_event(run, &notice);
             }
         }
-        Closed { report: self.report, failed: self.failed }
+        SessionOutcome { report: self.report, output_error: self.first_failure }
     }
 
     /// Recovers recordings of an earlier preview that was killed.
@@ -294,7 +294,7 @@ impl SessionWorker {
             }
             MemberState::Failed { why, .. } => {
                 tracing::error!("{why}");
-                self.failed.get_or_insert_with(|| why.clone());
+                self.first_failure.get_or_insert_with(|| why.clone());
                 self.events.send_update(Update::OutputFailure(why.clone()));
                 // An output of an earlier run may have the same name as one of the current run.
                 if run == self.runs {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Camera, DepthMethod, Output, Shown, Source};
+use super::{Camera, DepthMethod, Output, Source, ViewMode};
 use crate::services::PathKind;
 use bokehcam::camera_control::CameraControl;
 use bokehcam::depth::backdrop::Background;
@@ -35,7 +35,7 @@ pub enum Action {
     /// Deletes a user preset.
     DeletePreset(String),
     /// Changes the displayed view.
-    Show(Shown),
+    Show(ViewMode),
     /// Shows the unblurred picture left of this fraction of the width; `None` turns that off.
     Split(Option<f32>),
     /// Switches mirroring of the window.

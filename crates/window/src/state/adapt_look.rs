@@ -15,7 +15,7 @@ impl State {
     }
 
     /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
-    pub fn look_as_chosen(&self) -> Look {
+    pub fn chosen_look(&self) -> Look {
         let is_fitted = self.effect_replaced && self.look.effect == Effect::Blur;
         Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
     }

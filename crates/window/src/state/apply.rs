@@ -1,6 +1,6 @@
 //! Applies actions to the state.
 
-use super::{Action, DepthMethod, Output, Request, Shown, Source, State};
+use super::{Action, DepthMethod, Output, Request, Source, State, ViewMode};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
@@ -52,9 +52,9 @@ impl State {
             Action::RenamePreset(name, new) => return vec![Request::RenamePreset(name, new)],
             Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
             // Views without data are refused, with a note that explains why.
-            Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth_advice()),
-            Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(DEPTH_NOT_COMPUTED),
-            Action::Show(Shown::Coc | Shown::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
+            Action::Show(ViewMode::Depth) if !self.may_have_depth() => self.note(self.no_depth_advice()),
+            Action::Show(ViewMode::Depth) if !self.look.effect.follows_depth() => self.note(DEPTH_NOT_COMPUTED),
+            Action::Show(ViewMode::Coc | ViewMode::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
@@ -164,12 +164,12 @@ impl State {
             if matches!(look.strength, Strength::Lens(_)) {
                 look.strength = Strength::Default;
             }
-            if self.shown == Shown::Depth {
-                self.shown = Shown::Picture;
+            if self.shown == ViewMode::Depth {
+                self.shown = ViewMode::Picture;
             }
         }
-        if look.effect == Effect::None && matches!(self.shown, Shown::Coc | Shown::Bins) {
-            self.shown = Shown::Picture;
+        if look.effect == Effect::None && matches!(self.shown, ViewMode::Coc | ViewMode::Bins) {
+            self.shown = ViewMode::Picture;
         }
         self.look = look;
         vec![Request::Look(Box::new(self.look.clone()))]

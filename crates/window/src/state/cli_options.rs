@@ -1,13 +1,13 @@
 //! The window's state as command-line options.
 
-use super::{Shown, State};
+use super::{State, ViewMode};
 use crate::services::CliOption;
 use bokehcam::look::Look;
 
 impl State {
     /// Returns the options that reproduce the window, besides those of the look; defaults are omitted.
     pub fn cli_options(&self) -> Vec<CliOption> {
-        let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
+        let shown = Some(self.shown).filter(|shown| *shown != ViewMode::default());
         let yes = |on: bool| on.then(|| "true".to_owned());
         let cli_options = [
             ("show", shown.map(|shown| shown.to_string())),

@@ -33,7 +33,7 @@ pub use zoom::Zoom;
 
 use super::meters::Meters;
 use super::texts::translate_sentence;
-pub use super::views::Shown;
+pub use super::views::ViewMode;
 use super::views::{Legend, Probe};
 use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::demo;
@@ -128,7 +128,7 @@ pub struct State {
     /// Location of the last saved file.
     pub saved_in: Option<PathBuf>,
     /// The displayed view of a frame.
-    pub shown: Shown,
+    pub shown: ViewMode,
     /// Whether the window mirrors the picture.
     pub mirror: bool,
     /// Whether frames still use other kernels while those of the chosen look are being built.

@@ -117,7 +117,7 @@ fn a_photo_is_told_what_gives_it_depth() {
     let photo = Source::Running(Running { kind: Kind::Photo, is_live: false, ..camera.clone() });
     for (source, hint) in [(Source::Running(camera), NO_DEPTH), (photo, NO_DEPTH_OF_PHOTO)] {
         state.apply_update(Update::Source(source));
-        state.apply(Action::Show(Shown::Depth));
+        state.apply(Action::Show(ViewMode::Depth));
         assert_eq!(state.notes.last().unwrap().text, hint);
     }
     assert!(!state.can_pause_pipeline(), "not before its picture is there");
@@ -133,13 +133,13 @@ fn what_needs_depth_says_so_where_there_is_none() {
     // An effect that follows depth becomes a uniform blur, and the session is notified.
     let even = Look { effect: Effect::Blur, ..look() };
     assert_eq!(state.apply_update(Update::Source(running(false))), Some(Request::Look(Box::new(even.clone()))));
-    for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
+    for action in [Action::Preset("cinematic".into()), Action::Show(ViewMode::Depth)] {
         let before = state.notes.last().map(|note| note.number);
         assert_eq!(state.apply(action), []);
         let said = state.notes.last().unwrap();
         assert!(Some(said.number) > before && said.text == NO_DEPTH, "{said:?}");
     }
-    assert_eq!((state.shown, &state.look), (Shown::Picture, &even));
+    assert_eq!((state.shown, &state.look), (ViewMode::Picture, &even));
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
     assert_eq!(state.look.effect, Effect::TiltShift);
@@ -151,9 +151,9 @@ fn what_needs_depth_says_so_where_there_is_none() {
     assert_eq!(state.look.effect, Effect::Blur);
     state.apply_update(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
-    state.apply(Action::Show(Shown::Depth));
+    state.apply(Action::Show(ViewMode::Depth));
     state.apply_update(Update::Source(running(false)));
-    assert_eq!(state.shown, Shown::Picture);
+    assert_eq!(state.shown, ViewMode::Picture);
 }
 
 #[test]
@@ -344,7 +344,7 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let mut state = state();
     let chosen = state.look.clone();
     state.apply_update(Update::Source(running(false)));
-    assert_eq!((chosen.effect, state.look.effect, state.look_as_chosen()), (Effect::Auto, Effect::Blur, chosen));
+    assert_eq!((chosen.effect, state.look.effect, state.chosen_look()), (Effect::Auto, Effect::Blur, chosen));
     state.apply(Action::Preset("miniature".into()));
-    assert_eq!(state.look_as_chosen().effect, Effect::TiltShift, "that was chosen");
+    assert_eq!(state.chosen_look().effect, Effect::TiltShift, "that was chosen");
 }

@@ -1,7 +1,7 @@
 //! Applies the session's updates to the state.
 
 use super::apply::NO_METRES;
-use super::{Request, Shown, Source, State, Update};
+use super::{Request, Source, State, Update, ViewMode};
 use bokehcam::look::Look;
 
 impl State {
@@ -40,15 +40,15 @@ impl State {
             self.source_name.clone_from(&running.name);
         }
         self.source = source;
-        if self.shown == Shown::Depth && !self.may_have_depth() {
-            self.shown = Shown::Picture;
+        if self.shown == ViewMode::Depth && !self.may_have_depth() {
+            self.shown = ViewMode::Picture;
             self.note(self.no_depth_advice());
         }
         let chosen = match &self.source {
             // Restores a portrait effect that a source without depth replaced, unless the user chose another effect
             // since.
             Source::Running(running) if running.has_depth => {
-                let chosen = self.look_as_chosen();
+                let chosen = self.chosen_look();
                 self.effect_replaced = false;
                 chosen
             }

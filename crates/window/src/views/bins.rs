@@ -1,8 +1,8 @@
 //! The bins view: colours each pixel by the depth bin in which it is blurred.
 
 use super::Legend;
-use super::colors::BINS;
-use super::sample::Field;
+use super::coc_sampler::CocSampler;
+use super::colors::BIN_COLORS;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::plan::{MAX_BINS, Plan};
 use bokehcam::bokeh::{Rank, Settings};
@@ -15,15 +15,15 @@ pub const MAX: usize = MAX_BINS;
 
 /// Splits frames into bins like the blur does. Caches its plan while settings and size stay the same.
 #[derive(Default)]
-pub struct Bins {
+pub struct PlanCache {
     /// The plan, with the settings and size that it was made for.
-    made: Option<(Settings, (u32, u32), Plan)>,
+    cached: Option<(Settings, (u32, u32), Plan)>,
 }
 
-impl Bins {
+impl PlanCache {
     /// Returns a plan with the bins of this frame. Rebuilds the plan only if settings that affect the bins' bounds
     /// changed.
-    pub fn split(
+    pub fn plan_for_frame(
         &mut self,
         settings: &Settings,
         size: (u32, u32),
@@ -36,8 +36,8 @@ impl Bins {
             let radii_px = |settings: &Settings| [settings.far_max_px, settings.near_max_px];
             kind(planned) == kind(settings) && radii_px(planned) == radii_px(settings) && *planned_size == size
         };
-        self.made = self.made.take().filter(is_current);
-        let (.., plan) = self.made.get_or_insert_with(|| {
+        self.cached = self.cached.take().filter(is_current);
+        let (.., plan) = self.cached.get_or_insert_with(|| {
             // The bins do not depend on the aperture's kernels, so cheap ones suffice.
             let aperture = Aperture::default();
             let cheap = Settings { aperture, rank: Some(Rank::Terms(1)), adaptive: true, ..settings.clone() };
@@ -50,8 +50,8 @@ impl Bins {
     }
 }
 
-/// Colours each pixel by the bin of `plan` that contains its CoC. `columns` comes from [`Field::new`].
-pub fn draw(field: &Field, columns: &[u32], plan: &Plan, image: &mut ColorImage) -> Legend {
+/// Colours each pixel by the bin of `plan` that contains its CoC. `columns` comes from [`CocSampler::new`].
+pub fn draw(sampler: &CocSampler, columns: &[u32], plan: &Plan, image: &mut ColorImage) -> Legend {
     let mut high_px = [f32::INFINITY; MAX];
     let count = plan.bins.len().min(MAX);
     for (high_px, bin) in high_px.iter_mut().zip(&plan.bins) {
@@ -60,8 +60,8 @@ pub fn draw(field: &Field, columns: &[u32], plan: &Plan, image: &mut ColorImage)
     let borders = &high_px[..count.saturating_sub(1)];
     let (rows, row_bytes) = (image.height, image.width as usize * 3);
     for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
-        field.color_row(y, rows, columns, row, |_, coc_px| {
-            BINS[borders.iter().filter(|&&border| coc_px >= border).count()]
+        sampler.color_row(y, rows, columns, row, |_, coc_px| {
+            BIN_COLORS[borders.iter().filter(|&&border| coc_px >= border).count()]
         });
     }
     Legend::Bins { count, high_px }

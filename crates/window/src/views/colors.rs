@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
-/// Number of entries in the table of [`perceptual`] colours.
-pub const ENTRIES: usize = 256;
+/// Number of entries in the table of [`viridis`] colours.
+pub const COLORMAP_SIZE: usize = 256;
 
 /// Colours of bins, front to back: after Okabe and Ito, lightened or darkened so that neighbours differ in lightness.
-pub const BINS: [[u8; 3]; 13] = [
+pub const BIN_COLORS: [[u8; 3]; 13] = [
     [230, 159, 0],
     [120, 60, 20],
     [240, 228, 66],
@@ -23,7 +23,7 @@ pub const BINS: [[u8; 3]; 13] = [
 ];
 
 /// Viridis, approximated by polynomials (Matt Zucker, public domain).
-static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
+static VIRIDIS: LazyLock<[[u8; 3]; COLORMAP_SIZE]> = LazyLock::new(|| {
     const TERMS: [[f64; 3]; 7] = [
         [0.277_727_327_223_417_7, 0.005_407_344_544_966_578, 0.334_099_805_335_306_1],
         [0.105_093_043_108_577_4, 1.404_613_529_898_575, 1.384_590_162_594_685],
@@ -34,7 +34,7 @@ static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
         [-5.435_455_855_934_631, 4.645_852_612_178_535, 26.312_435_249_583_2],
     ];
     std::array::from_fn(|k| {
-        let t = k as f64 / (ENTRIES - 1) as f64;
+        let t = k as f64 / (COLORMAP_SIZE - 1) as f64;
         // Horner's scheme, from the highest power down.
         let at = |channel: usize| TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term[channel]);
         [0, 1, 2].map(|channel| (at(channel) * 255.0).round().clamp(0.0, 255.0) as u8)
@@ -42,13 +42,13 @@ static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
 });
 
 /// Returns the colours from 0 (darkest, violet) to 1 (lightest, yellow), perceptually uniform.
-pub fn perceptual() -> &'static [[u8; 3]; ENTRIES] {
-    &PERCEPTUAL
+pub fn viridis() -> &'static [[u8; 3]; COLORMAP_SIZE] {
+    &VIRIDIS
 }
 
 /// Returns a diverging colour for `position` from -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind:
 /// blue), equally dark at both ends.
-pub fn diverging(position: f32) -> [u8; 3] {
+pub fn diverging_color(position: f32) -> [u8; 3] {
     const SHARP: [f32; 3] = [246.0, 246.0, 242.0];
     const NEAR: [[f32; 3]; 2] = [[238.0, 150.0, 70.0], [122.0, 30.0, 20.0]];
     const FAR: [[f32; 3]; 2] = [[90.0, 160.0, 215.0], [16.0, 42.0, 105.0]];

@@ -1,17 +1,17 @@
 //! Diagnostic views of the blur: depth, circle of confusion and bins, in false colours with a legend.
 
 mod bins;
+mod coc;
+mod coc_sampler;
 mod colors;
 mod depth;
 mod probe;
-mod radius;
-mod sample;
 #[cfg(test)]
 mod tests;
 
 pub use bins::MAX as MAX_BINS;
-pub use colors::{BINS as BIN_COLORS, diverging, perceptual};
-pub use depth::fraction_of as depth_fraction;
+pub use colors::{BIN_COLORS, diverging_color, viridis};
+pub use depth::depth_fraction;
 pub use probe::Probe;
 
 use bokehcam::bokeh::Settings;
@@ -21,7 +21,7 @@ use bokehcam::pipeline::View;
 
 named! {
     /// What of a frame is shown.
-    pub enum Shown default Picture {
+    pub enum ViewMode default Picture {
         /// The picture
         Picture = "picture",
         /// Its depth, in colours
@@ -36,14 +36,14 @@ named! {
 /// Meaning of a view's colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Legend {
-    /// Depth: [`perceptual`] colours, linear in dioptres, light is near.
+    /// Depth: [`viridis`] colours, linear in dioptres, light is near.
     Depth {
         /// Distance of the lightest colour, in metres; nearer depths have the same colour.
         near_m: f32,
         /// Distance of the darkest colour, in metres.
         far_m: f32,
     },
-    /// Circle of confusion: [`diverging`] colours, hatched in front.
+    /// Circle of confusion: [`diverging_color`] colours, hatched in front.
     Coc {
         /// Radius of the darkest colours, in front and behind, in pixels.
         max_px: f32,
@@ -62,30 +62,30 @@ pub enum Legend {
 pub struct Views {
     image: ColorImage,
     legend: Option<Legend>,
-    depth: depth::Range,
+    depth_range: depth::ColorRange,
     /// The depth map's column for each column of the picture.
     columns: Vec<u32>,
-    bins: bins::Bins,
+    plans: bins::PlanCache,
 }
 
 impl Views {
     /// Draws the view `shown` of a frame, in its picture's size; `None` for the picture itself or if the frame lacks
     /// the data. `settings` are those of the frame's blur. Allocates only if the size or the bins change.
-    pub fn draw(&mut self, shown: Shown, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
+    pub fn draw(&mut self, shown: ViewMode, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
         self.legend = None;
         let size = view.picture.size();
         let depth = view.depth.as_deref();
-        let field = sample::Field::new(&view.coc, depth, size, &mut self.columns);
+        let sampler = coc_sampler::CocSampler::new(&view.coc, depth, size, &mut self.columns);
         let (image, columns) = (&mut self.image, &self.columns[..]);
         image.resize(size.0, size.1);
         self.legend = match shown {
-            Shown::Picture => None,
-            Shown::Depth => depth.map(|depth| depth::draw(depth, columns, &mut self.depth, image)),
-            Shown::Coc => field.map(|field| radius::draw(&field, columns, settings, image)),
-            Shown::Bins => {
+            ViewMode::Picture => None,
+            ViewMode::Depth => depth.map(|depth| depth::draw(depth, columns, &mut self.depth_range, image)),
+            ViewMode::Coc => sampler.map(|sampler| coc::draw(&sampler, columns, settings, image)),
+            ViewMode::Bins => {
                 let level = view.trace.quality;
-                let plan = settings.map(|settings| self.bins.split(settings, size, level, depth, &view.coc));
-                field.zip(plan).map(|(field, plan)| bins::draw(&field, columns, plan, image))
+                let plan = settings.map(|settings| self.plans.plan_for_frame(settings, size, level, depth, &view.coc));
+                sampler.zip(plan).map(|(sampler, plan)| bins::draw(&sampler, columns, plan, image))
             }
         };
         self.legend.map(|_| &self.image)

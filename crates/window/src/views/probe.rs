@@ -1,6 +1,6 @@
 //! Depth and blur of a single pixel.
 
-use super::sample::{depth_row, scale_index};
+use super::coc_sampler::{depth_row, scale_index};
 use bokehcam::frame::DepthMap;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
@@ -16,16 +16,16 @@ pub struct Probe {
 
 impl Probe {
     /// Reads the values of a frame at fractions of its width and height.
-    pub fn of(view: &View, [x, y]: [f32; 2]) -> Self {
+    pub fn read(view: &View, [x, y]: [f32; 2]) -> Self {
         let (width, height) = view.picture.size();
         let pixel = |at: f32, side: u32| ((at * side as f32) as u32).min(side.saturating_sub(1));
         let (x, y) = (pixel(x, width), pixel(y, height));
-        let there = |map: &DepthMap| {
+        let depth_at = |map: &DepthMap| {
             let row = depth_row(map, y, height);
             row[scale_index(x, width, map.width) as usize]
         };
         let map = view.depth.as_deref().filter(|map| map.width > 0 && map.height > 0);
-        let metres = map.map(there);
+        let metres = map.map(depth_at);
         let coc_px = match view.coc {
             CocField::Uniform { radius_px } => radius_px,
             CocField::Ramp(ramp) => ramp.coc_px(x as f32 + 0.5, y as f32 + 0.5),

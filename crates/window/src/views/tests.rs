@@ -41,7 +41,7 @@ fn lightness([r, g, b]: [u8; 3]) -> f32 {
 
 #[test]
 fn the_colours_of_depth_grow_lighter_evenly() {
-    let steps: Vec<f32> = perceptual().iter().map(|&color| lightness(color)).collect();
+    let steps: Vec<f32> = viridis().iter().map(|&color| lightness(color)).collect();
     assert!(steps.windows(2).all(|pair| pair[1] > pair[0] - 0.6), "{steps:?}");
     let (first, last) = (steps[0], steps[255]);
     for (k, &step) in steps.iter().enumerate() {
@@ -54,7 +54,7 @@ fn the_colours_of_depth_grow_lighter_evenly() {
 fn near_is_light_and_the_legend_says_how_near() {
     let mut views = Views::default();
     let view = view((64, 8), (32, 4), CocField::Depth(LENS));
-    let image = views.draw(Shown::Depth, &view, None).unwrap();
+    let image = views.draw(ViewMode::Depth, &view, None).unwrap();
     assert_eq!(image.size(), (64, 8));
     let row: Vec<f32> = (0..64).map(|x| lightness(pixel(image, x, 3))).collect();
     assert!(row.windows(2).all(|pair| pair[1] <= pair[0] + 0.6), "{row:?}");
@@ -70,7 +70,7 @@ fn unknown_depth_is_grey() {
     let mut view = view((16, 16), (16, 16), CocField::Depth(LENS));
     for metres in [0.0, f32::NAN, f32::INFINITY, -1.0] {
         view.depth.as_mut().unwrap().metres.fill(metres);
-        let image = views.draw(Shown::Depth, &view, None).unwrap();
+        let image = views.draw(ViewMode::Depth, &view, None).unwrap();
         assert!(image.rgb.as_chunks::<3>().0.iter().all(|[r, g, b]| r == g && g == b), "{metres}");
     }
 }
@@ -80,7 +80,7 @@ fn sharp_is_white_and_front_and_back_are_told_apart_without_colour() {
     let mut views = Views::default();
     let view = view((640, 360), (640, 360), CocField::Depth(LENS));
     let settings = settings((640, 360));
-    let image = views.draw(Shown::Coc, &view, Some(&settings)).unwrap();
+    let image = views.draw(ViewMode::Coc, &view, Some(&settings)).unwrap();
     let column = |metres: f32| ((metres - 0.5) / 9.5 * 640.0) as u32;
     let sharp = pixel(image, column(2.0), 100);
     assert!(lightness(sharp) > 235.0, "{sharp:?}");
@@ -98,7 +98,7 @@ fn sharp_is_white_and_front_and_back_are_told_apart_without_colour() {
 fn each_pixel_has_the_colour_of_its_bin() {
     let size = (640, 360);
     let (mut views, view, settings) = (Views::default(), view(size, size, CocField::Depth(LENS)), settings(size));
-    let image = views.draw(Shown::Bins, &view, Some(&settings)).unwrap().clone();
+    let image = views.draw(ViewMode::Bins, &view, Some(&settings)).unwrap().clone();
     let mut plan = Plan::new(&settings, size.0, size.1);
     plan.set_quality(Quality::Balanced);
     plan.split_by_depth(view.depth.as_deref(), &view.coc);
@@ -128,7 +128,7 @@ fn every_field_can_be_shown_at_any_size() {
         for map in [(1, 1), (8, 30), (640, 360)] {
             for coc in [CocField::Uniform { radius_px: 4.0 }, CocField::Ramp(ramp), CocField::Depth(LENS)] {
                 let view = view(size, map, coc);
-                for shown in [Shown::Depth, Shown::Coc, Shown::Bins] {
+                for shown in [ViewMode::Depth, ViewMode::Coc, ViewMode::Bins] {
                     let image = views.draw(shown, &view, Some(&settings(size))).unwrap();
                     assert_eq!((image.size(), image.rgb.len()), (size, (size.0 * size.1 * 3) as usize));
                 }
@@ -141,9 +141,9 @@ fn every_field_can_be_shown_at_any_size() {
 fn the_picture_keeps_its_memory() {
     let size = (640, 360);
     let (mut views, view, settings) = (Views::default(), view(size, (320, 180), CocField::Depth(LENS)), settings(size));
-    let place = |views: &mut Views, shown: Shown| views.draw(shown, &view, Some(&settings)).unwrap().rgb.as_ptr();
-    let first = place(&mut views, Shown::Depth);
-    for shown in [Shown::Coc, Shown::Bins, Shown::Depth] {
+    let place = |views: &mut Views, shown: ViewMode| views.draw(shown, &view, Some(&settings)).unwrap().rgb.as_ptr();
+    let first = place(&mut views, ViewMode::Depth);
+    for shown in [ViewMode::Coc, ViewMode::Bins, ViewMode::Depth] {
         assert_eq!(place(&mut views, shown), first);
     }
 }
@@ -152,11 +152,11 @@ fn the_picture_keeps_its_memory() {
 fn what_cannot_be_shown_is_not() {
     let mut views = Views::default();
     let mut view = view((16, 16), (16, 16), CocField::Depth(LENS));
-    assert!(views.draw(Shown::Picture, &view, None).is_none());
-    assert!(views.draw(Shown::Bins, &view, None).is_none(), "nothing is blurred");
+    assert!(views.draw(ViewMode::Picture, &view, None).is_none());
+    assert!(views.draw(ViewMode::Bins, &view, None).is_none(), "nothing is blurred");
     view.depth = None;
     let settings = settings((16, 16));
-    for shown in [Shown::Depth, Shown::Coc, Shown::Bins] {
+    for shown in [ViewMode::Depth, ViewMode::Coc, ViewMode::Bins] {
         assert!(views.draw(shown, &view, Some(&settings)).is_none() && views.legend().is_none());
     }
 }
@@ -168,17 +168,17 @@ fn a_probe_is_the_value_of_its_pixel_whatever_the_size_of_the_map() {
         for x in [0.0, 0.3, 0.62, 1.0] {
             let column = ((x * 40.0) as u32).min(39) * map.0 / 40;
             let expected_m = 0.5 + 9.5 * column as f32 / map.0 as f32;
-            let probe = Probe::of(&view, [x, 0.5]);
+            let probe = Probe::read(&view, [x, 0.5]);
             assert!((probe.depth_m.unwrap() - expected_m).abs() < 1e-5, "{probe:?} at {x}");
             assert!((probe.coc_px - LENS.coc_px(expected_m)).abs() < 1e-5);
             assert_eq!(probe.coc_px < 0.0, expected_m < LENS.focus_m, "negative in front");
         }
         view.depth = None;
-        assert_eq!(Probe::of(&view, [0.5; 2]).depth_m, None);
+        assert_eq!(Probe::read(&view, [0.5; 2]).depth_m, None);
     }
     let even = view((8, 8), (8, 8), CocField::Uniform { radius_px: 3.0 });
-    assert_eq!(Probe::of(&even, [0.9; 2]).coc_px, 3.0);
+    assert_eq!(Probe::read(&even, [0.9; 2]).coc_px, 3.0);
     let ramp = Ramp { normal: glam::vec2(0.0, 1.0), offset_px: 4.0, half_band_px: 1.0, slope: 0.5, max_px: 9.0 };
     let view = view((8, 8), (8, 8), CocField::Ramp(ramp));
-    assert_eq!(Probe::of(&view, [0.1, 0.95]).coc_px, ramp.coc_px(0.5, 7.5));
+    assert_eq!(Probe::read(&view, [0.1, 0.95]).coc_px, ramp.coc_px(0.5, 7.5));
 }

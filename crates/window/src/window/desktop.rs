@@ -33,12 +33,12 @@ fn watch_portal(on_theme: &impl Fn(Theme) -> bool) -> zbus::Result<()> {
     // Old portals have only `Read`, which wraps the value once more.
     let asked = portal.call("ReadOne", &(NAMESPACE, KEY)).or_else(|_| portal.call("Read", &(NAMESPACE, KEY)));
     let now: OwnedValue = asked?;
-    if !on_theme(theme_of(&now)) {
+    if !on_theme(parse_theme(&now)) {
         return Ok(());
     }
     for change in changes {
         let Ok((namespace, key, value)) = change.body().deserialize::<(String, String, OwnedValue)>() else { continue };
-        if (namespace.as_str(), key.as_str()) == (NAMESPACE, KEY) && !on_theme(theme_of(&value)) {
+        if (namespace.as_str(), key.as_str()) == (NAMESPACE, KEY) && !on_theme(parse_theme(&value)) {
             break;
         }
     }
@@ -47,9 +47,9 @@ fn watch_portal(on_theme: &impl Fn(Theme) -> bool) -> zbus::Result<()> {
 
 /// Returns the theme for a colour scheme: 1 prefers dark, 2 light, others have no preference. The default is dark,
 /// because pictures are judged best in dark surroundings.
-fn theme_of(scheme: &Value) -> Theme {
+fn parse_theme(scheme: &Value) -> Theme {
     match scheme {
-        Value::Value(inner) => theme_of(inner),
+        Value::Value(inner) => parse_theme(inner),
         Value::U32(2) => Theme::Light,
         _ => Theme::Dark,
     }

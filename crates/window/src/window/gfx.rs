@@ -8,7 +8,7 @@ use winit::window::{Fullscreen, Window};
 
 use super::WindowError;
 use super::saved_state::WindowSize;
-use crate::present::{self, Area, Part, Presenter, enlarged, fitted};
+use crate::present::{self, Area, Presenter, VisibleRegion, fitted_area, zoomed_area};
 use crate::state::Zoom;
 use bokehcam::compute::device::Device;
 
@@ -20,7 +20,7 @@ pub(super) struct Gfx {
 }
 
 /// Application id by which desktops group windows.
-const CLASS: &str = "bokehcam";
+const APP_ID: &str = "bokehcam";
 const DEFAULT_SIZE: LogicalSize<f64> = LogicalSize::new(1280.0, 720.0);
 const MIN_SIZE: LogicalSize<f64> = LogicalSize::new(240.0, 160.0);
 
@@ -39,17 +39,17 @@ impl Gfx {
         use winit::platform::{wayland::WindowAttributesExtWayland, x11::WindowAttributesExtX11};
         let inner = size.map_or(DEFAULT_SIZE, |size| LogicalSize::new(size.width, size.height));
         let attributes = Window::default_attributes()
-            .with_title(CLASS)
+            .with_title(APP_ID)
             .with_inner_size(inner)
             .with_min_inner_size(MIN_SIZE)
             .with_maximized(size.is_some_and(|size| size.maximized))
             .with_fullscreen(full_screen.then_some(Fullscreen::Borderless(None)));
         // X11 and Wayland set the application id separately.
-        let attributes = WindowAttributesExtX11::with_name(attributes, CLASS, CLASS);
-        let attributes = WindowAttributesExtWayland::with_name(attributes, CLASS, CLASS);
+        let attributes = WindowAttributesExtX11::with_name(attributes, APP_ID, APP_ID);
+        let attributes = WindowAttributesExtWayland::with_name(attributes, APP_ID, APP_ID);
         let window = events.create_window(attributes).map_err(|error| WindowError::NoWindow(error.to_string()))?;
         let window = Arc::new(window);
-        let mut presenter = present::create(Arc::clone(&window), device)?;
+        let mut presenter = present::create_presenter(Arc::clone(&window), device)?;
         let PhysicalSize { width, height } = window.inner_size();
         presenter.resize((width, height));
         let scale = window.scale_factor() as f32;
@@ -64,22 +64,28 @@ impl Gfx {
         Ok(Self { window, input, presenter })
     }
 
-    /// Returns the picture's area within `room`, the part of the window that the panel leaves at its top left: centred,
+    /// Returns the picture's area within `available`, the part of the window that the panel leaves at its top left: centred,
     /// fitted or zoomed, with the visible part if zoomed.
-    pub fn area(&self, size: (u32, u32), room: (u32, u32), zoom: Zoom, mirror: bool) -> (Area, Option<Part>) {
+    pub fn picture_area(
+        &self,
+        size: (u32, u32),
+        available: (u32, u32),
+        zoom: Zoom,
+        mirror: bool,
+    ) -> (Area, Option<VisibleRegion>) {
         let PhysicalSize { width, height } = self.window.inner_size();
-        // Until the next layout, the room may be that of a previous, larger window.
-        let room = (room.0.min(width), room.1.min(height));
+        // Until the next layout, the available area may be that of a previous, larger window.
+        let available = (available.0.min(width), available.1.min(height));
         if zoom.factor == 0 {
-            return (fitted(size, room), None);
+            return (fitted_area(size, available), None);
         }
         let [x, y] = zoom.center;
-        let (area, part) = enlarged(size, room, zoom.factor, [if mirror { 1.0 - x } else { x }, y]);
-        (area, Some(part))
+        let (area, visible_region) = zoomed_area(size, available, zoom.factor, [if mirror { 1.0 - x } else { x }, y]);
+        (area, Some(visible_region))
     }
 
     /// Returns the size to save; `None` in full screen, which is not the window's own size.
-    pub fn size(&self) -> Option<WindowSize> {
+    pub fn size_to_save(&self) -> Option<WindowSize> {
         let LogicalSize { width, height } = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
         let maximized = self.window.is_maximized();
         (self.window.fullscreen().is_none() && width > 0.0).then_some(WindowSize { width, height, maximized })

@@ -72,7 +72,7 @@ fn window() {
     use bokehcam::pipeline::{Trace, View};
     use bokehcam_window::meters::Meters;
     use bokehcam_window::present::{Area, Drawing, Image, soft::Painter};
-    use bokehcam_window::state::Shown;
+    use bokehcam_window::state::ViewMode;
     use bokehcam_window::views::Views;
 
     let (picture, depth) = (noise(160, 90), three_depths(160, 90));
@@ -89,7 +89,7 @@ fn window() {
     painter.resize((320, 200));
     let mut pixels = vec![0; 320 * 200];
     let mut frame = |at: u64| {
-        for shown in [Shown::Depth, Shown::Coc, Shown::Bins] {
+        for shown in [ViewMode::Depth, ViewMode::Coc, ViewMode::Bins] {
             views.draw(shown, &view, Some(&settings));
         }
         let areas = [Area { x: 80, y: 55, width: 160, height: 90 }, Area { x: 0, y: 10, width: 320, height: 180 }];
@@ -98,7 +98,7 @@ fn window() {
             let (picture, background) = (Image::Memory(views.image()), [1, 2, 3]);
             let drawing = Drawing {
                 area,
-                part: None,
+                visible_region: None,
                 picture,
                 before,
                 mirror: at.is_multiple_of(2),

@@ -152,12 +152,12 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
             watched.frame("a frame", |_| true);
         }
         let closed = watched.heard.session.close();
-        assert!(closed.failed.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
+        assert!(closed.output_error.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
         assert!(closed.report.unwrap().frames.balance());
     }
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
-    assert_eq!(watched.heard.session.close().failed, None);
+    assert_eq!(watched.heard.session.close().output_error, None);
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod gpu;
 use bokehcam::frame::ColorImage;
 use bokehcam_window::panel;
 use bokehcam_window::present::soft::Painter;
-use bokehcam_window::present::{Area, Controls, Drawing, Image, enlarged};
+use bokehcam_window::present::{Area, Controls, Drawing, Image, zoomed_area};
 use common::{color, noise};
 
 const BACKGROUND: [u8; 3] = [9, 8, 7];
@@ -16,7 +16,7 @@ fn drawing(picture: &ColorImage, area: Area) -> Drawing<'_> {
     Drawing {
         area,
         picture: Image::Memory(picture),
-        part: None,
+        visible_region: None,
         before: None,
         mirror: false,
         stale: false,
@@ -219,10 +219,10 @@ fn enlargements<'a>(picture: &'a ColorImage, before: &'a ColorImage) -> Vec<(Str
     for window in [(40, 30), (97, 60)] {
         for (factor, center) in [(1, [0.5, 0.5]), (1, [0.9, 0.1]), (2, [0.3, 0.6]), (4, [1.0, 1.0]), (8, [0.37, 0.71])]
         {
-            let (place, part) = enlarged(picture.size(), window, factor, center);
+            let (place, part) = zoomed_area(picture.size(), window, factor, center);
             for (manner, drawing) in manners(picture, before, place) {
                 let what = format!("{window:?} at {factor} around {center:?}, {manner}");
-                all.push((what, window, Drawing { part: Some(part), ..drawing }));
+                all.push((what, window, Drawing { visible_region: Some(part), ..drawing }));
             }
         }
     }
@@ -234,19 +234,19 @@ fn an_enlarged_picture_shows_its_pixels_as_they_are() {
     let (picture, before) = (noise(64, 48), noise(64, 48));
     for (what, window, shown) in enlargements(&picture, &before).into_iter().filter(|(.., shown)| !shown.stale) {
         let pixels = paint(window, &shown, None);
-        let (place, part) = (shown.area, shown.part.unwrap());
+        let (place, part) = (shown.area, shown.visible_region.unwrap());
         let whole = 64 * part.factor;
-        let divider = shown.before.map(|(_, at)| (at * whole as f32).round() as i64 - i64::from(part.at.0));
+        let divider = shown.before.map(|(_, at)| (at * whole as f32).round() as i64 - i64::from(part.origin.0));
         for y in 0..window.1 {
             for x in 0..window.0 {
                 let there = (x >= place.x && y >= place.y).then(|| (x - place.x, y - place.y));
                 let inside = there.filter(|(x, y)| *x < place.width && *y < place.height);
                 let expected = inside.map_or(BACKGROUND, |(x, y)| {
-                    let seen = x + part.at.0;
+                    let seen = x + part.origin.0;
                     let column = if shown.mirror { whole - 1 - seen } else { seen };
                     let is_before = divider.is_some_and(|at| i64::from(x) < at);
                     let source = if is_before { &before } else { &picture };
-                    at(source, column / part.factor, (y + part.at.1) / part.factor)
+                    at(source, column / part.factor, (y + part.origin.1) / part.factor)
                 });
                 let near_divider =
                     inside.zip(divider).is_some_and(|((x, _), at)| (at - 2..at + 2).contains(&i64::from(x)));

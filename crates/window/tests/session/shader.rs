@@ -19,6 +19,6 @@ fn what_draws_the_window_validates_and_takes_what_rust_gives_it() {
     macro_rules! fields {
         ($($field:ident),*) => { [$((stringify!($field), offset_of!(WindowUniform, $field))),*] };
     }
-    assert_eq!(theirs, fields!(area, size, split, mirror, stale, divider, part, stripes, background));
+    assert_eq!(theirs, fields!(area, size, split, mirror, stale, divider, visible_region, stripes, background));
     assert_eq!(*span as usize, size_of::<WindowUniform>());
 }

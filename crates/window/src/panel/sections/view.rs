@@ -4,24 +4,24 @@ use egui::Ui;
 
 use super::Sheet;
 use crate::panel::widgets::{Number, add_choice, add_number, add_remark};
-use crate::state::{Action, Shown};
+use crate::state::{Action, ViewMode};
 
-type Views = [(&'static str, &'static str, Shown); 2];
+type Views = [(&'static str, &'static str, ViewMode); 2];
 
 const VIEWS: Views = [
-    ("Picture", "The blurred picture", Shown::Picture),
-    ("Depth", "Distance in colours: light is near (D)", Shown::Depth),
+    ("Picture", "The blurred picture", ViewMode::Picture),
+    ("Depth", "Distance in colours: light is near (D)", ViewMode::Depth),
 ];
 const INTERNALS: Views = [
-    ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
-    ("Layers", "The layers, each blurred separately (N)", Shown::Bins),
+    ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", ViewMode::Coc),
+    ("Layers", "The layers, each blurred separately (N)", ViewMode::Bins),
 ];
 
 /// Adds radio buttons for views; clicking the active one returns to the picture.
 fn add_view_choice(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
     let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
-    if let Some(shown) = add_choice(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
-        sheet.push_action(Action::Show(if shown == now { Shown::Picture } else { shown }));
+    if let Some(shown) = add_choice(ui, what, &views, now, |shown| has_depth || shown != ViewMode::Depth) {
+        sheet.push_action(Action::Show(if shown == now { ViewMode::Picture } else { shown }));
     }
 }
 

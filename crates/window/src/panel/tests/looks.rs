@@ -64,12 +64,12 @@ impl Seen {
         (0..30).for_each(|_| self.pass(Vec::new()));
         let whole = self.window.canvas.area;
         let room = crate::panel::picture_area_px(&self.window.ctx);
-        let area = crate::present::fitted((1280, 720), room);
+        let area = crate::present::fitted_area((1280, 720), room);
         let image = backdrop((area.width, area.height));
         let mut pixels = vec![0; (whole.width * whole.height) as usize];
         let drawing = Drawing {
             area,
-            part: None,
+            visible_region: None,
             picture: Image::Memory(&image),
             before: None,
             mirror: false,

@@ -6,7 +6,7 @@ use egui::{Key, Modifiers, pos2};
 
 use super::{Action, Window, sample};
 use crate::services::PathKind;
-use crate::state::{Request, Shown, Source, State, Update};
+use crate::state::{Request, Source, State, Update, ViewMode};
 use bokehcam::depth::backdrop::{Background, BackgroundPicture};
 use bokehcam::frame::ColorImage;
 
@@ -29,8 +29,8 @@ fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
     for inner in ["Blur radius", "Layers", "Quality", "Instruments", "cpu, 2 threads, AVX2"] {
         assert!(window.place_of(inner).is_some(), "{inner}");
     }
-    assert_eq!(window.click_on("Blur radius"), [Action::Show(Shown::Coc)]);
-    assert_eq!(window.click_on("Blur radius"), [Action::Show(Shown::Picture)]);
+    assert_eq!(window.click_on("Blur radius"), [Action::Show(ViewMode::Coc)]);
+    assert_eq!(window.click_on("Blur radius"), [Action::Show(ViewMode::Picture)]);
     assert_eq!(window.click_on("View"), [Action::Section("View", true)]);
     window.wait(0.5);
     assert!(window.place_of("Mirror").is_some());

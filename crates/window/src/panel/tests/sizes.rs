@@ -21,7 +21,7 @@ fn states() -> Vec<State> {
     tilt.legend = Some(Legend::Coc { max_px: 0.0 });
     all.push(tilt);
     let mut off = base.clone();
-    (off.look.effect, off.shown, off.source) = (Effect::None, state::Shown::Bins, Source::Lost("why ".repeat(200)));
+    (off.look.effect, off.shown, off.source) = (Effect::None, state::ViewMode::Bins, Source::Lost("why ".repeat(200)));
     off.legend = Some(Legend::Bins { count: 13, high_px: [f32::INFINITY; 13] });
     off.focus_m = Some(f32::INFINITY);
     all.push(off);

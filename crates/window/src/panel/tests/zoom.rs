@@ -2,9 +2,9 @@
 
 use egui::{Event, Key, Modifiers, Pos2, pos2};
 
-use super::super::super::state::{Action, Shown, Zoom};
+use super::super::super::state::{Action, ViewMode, Zoom};
 use super::{Window, button, close, point, scrolled};
-use crate::present::enlarged;
+use crate::present::zoomed_area;
 use crate::views::Probe;
 
 /// Lays the picture out as the window does.
@@ -12,8 +12,8 @@ fn place(window: &mut Window) {
     let Zoom { factor, center: [x, y] } = window.state.zoom;
     let center = [if window.state.mirror { 1.0 - x } else { x }, y];
     let (size, picture) = ((window.size.x as u32, window.size.y as u32), window.canvas.size);
-    let (area, part) = enlarged(picture, size, factor, center);
-    (window.canvas.area, window.canvas.part) = (area, Some(part));
+    let (area, part) = zoomed_area(picture, size, factor, center);
+    (window.canvas.area, window.canvas.visible_region) = (area, Some(part));
     window.pass(Vec::new());
 }
 
@@ -154,7 +154,7 @@ fn depth_and_blur_under_the_pointer_are_shown_where_one_looks_into_them() {
     window.pass(vec![Event::PointerMoved(at)]);
     assert_eq!(window.panel.probed, None, "nothing disturbs the picture");
     window.state.probe = Some(Probe { depth_m: Some(1.234), coc_px: 4.2 });
-    window.state.shown = Shown::Depth;
+    window.state.shown = ViewMode::Depth;
     window.pass(Vec::new());
     assert!(close(window.panel.probed.unwrap(), [0.25, 0.25]));
     window.state.mirror = true;

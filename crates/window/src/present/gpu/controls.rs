@@ -36,7 +36,7 @@ impl Overlay {
     }
 
     /// Replaces the controls.
-    pub fn set(&mut self, device: &Device, controls: Controls) {
+    pub fn set_controls(&mut self, device: &Device, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
         // Only the replaced controls still used these.
         self.freed.drain(..).for_each(|id| self.renderer.free_texture(&id));
@@ -61,15 +61,15 @@ impl Overlay {
             return Vec::new();
         }
         self.size = size;
-        let screen = self.screen();
+        let screen = self.screen_descriptor();
         self.renderer.update_buffers(&device.device, &device.queue, encoder, &self.primitives, &screen)
     }
 
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'static>) {
-        self.renderer.render(pass, &self.primitives, &self.screen());
+        self.renderer.render(pass, &self.primitives, &self.screen_descriptor());
     }
 
-    fn screen(&self) -> ScreenDescriptor {
+    fn screen_descriptor(&self) -> ScreenDescriptor {
         ScreenDescriptor { size_in_pixels: self.size.into(), pixels_per_point: self.pixels_per_point }
     }
 }

@@ -5,14 +5,14 @@ mod controls;
 
 use std::sync::Arc;
 
-pub use canvas::{Canvas, PRESENT, Window as WindowUniform};
+pub use canvas::{Canvas, PRESENT, WindowUniform};
 use winit::window::Window;
 
 use super::{Controls, Drawing, PresentError, Presenter};
 use bokehcam::compute::device::{Device, DevicePicture};
 
 /// The GPU presenter.
-pub struct Gpu {
+pub struct GpuPresenter {
     device: Arc<Device>,
     window: Arc<Window>,
     /// `None` only during `drop`.
@@ -23,13 +23,13 @@ pub struct Gpu {
     canvas: Canvas,
 }
 
-impl Gpu {
+impl GpuPresenter {
     /// Creates a presenter for a window.
     ///
     /// # Errors
     /// Fails if the device cannot draw to it.
     pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
-        let surface = new_surface(&window, &device)?;
+        let surface = create_surface(&window, &device)?;
         let capabilities = surface.get_capabilities(&device.adapter);
         // Pictures and controls are already sRGB-encoded: prefer a format that does not encode them again.
         let plain = |format: &wgpu::TextureFormat| {
@@ -60,7 +60,7 @@ impl Gpu {
             gpu.resize((size.width, size.height));
             gpu
         });
-        made.map_err(present_error)
+        made.map_err(to_present_error)
     }
 
     /// Configures the surface with `config`, unless the window has zero size.
@@ -82,22 +82,22 @@ impl Gpu {
                 Current::Timeout | Current::Occluded => return Ok(None),
                 Current::Outdated => self.configure(),
                 Current::Lost => {
-                    self.device.check().map_err(present_error)?;
-                    self.surface = Some(new_surface(&self.window, &self.device)?);
+                    self.device.check().map_err(to_present_error)?;
+                    self.surface = Some(create_surface(&self.window, &self.device)?);
                     self.configure();
                 }
-                Current::Validation => self.device.check().map_err(present_error)?,
+                Current::Validation => self.device.check().map_err(to_present_error)?,
             }
         }
         Ok(None)
     }
 }
 
-fn present_error(error: impl std::fmt::Display) -> PresentError {
+fn to_present_error(error: impl std::fmt::Display) -> PresentError {
     PresentError(error.to_string())
 }
 
-impl Drop for Gpu {
+impl Drop for GpuPresenter {
     fn drop(&mut self) {
         // Freeing the surface of a hung device would block forever, so it is leaked.
         if self.device.check().is_err() {
@@ -106,15 +106,15 @@ impl Drop for Gpu {
     }
 }
 
-fn new_surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
-    let surface = device.instance.create_surface(Arc::clone(window)).map_err(present_error)?;
+fn create_surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
+    let surface = device.instance.create_surface(Arc::clone(window)).map_err(to_present_error)?;
     if !device.adapter.is_surface_supported(&surface) {
         return Err(PresentError(format!("{} cannot draw to windows of this display", device.name)));
     }
     Ok(surface)
 }
 
-impl Presenter for Gpu {
+impl Presenter for GpuPresenter {
     fn resize(&mut self, (width, height): (u32, u32)) {
         if (self.config.width, self.config.height) == (width, height) && self.configured {
             return;
@@ -129,7 +129,7 @@ impl Presenter for Gpu {
     }
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
-        self.device.check().map_err(present_error)?;
+        self.device.check().map_err(to_present_error)?;
         if !self.configured {
             return Ok(());
         }
@@ -138,10 +138,10 @@ impl Presenter for Gpu {
         self.canvas.draw(&view, (self.config.width, self.config.height), drawing);
         self.window.pre_present_notify();
         self.device.queue.present(texture);
-        self.device.check().map_err(present_error)
+        self.device.check().map_err(to_present_error)
     }
 
-    fn has_device(&self) -> bool {
+    fn uses_gpu(&self) -> bool {
         true
     }
 

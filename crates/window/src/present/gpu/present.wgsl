@@ -9,7 +9,7 @@ struct Window {
     mirror: u32,                // 1: mirrored
     stale: vec4<f32>,           // luma weights of red, green and blue; w is 1 if the picture is shown grey
     divider: vec4<u32>,         // edges of the split line's three stripes, in columns of the area
-    part: vec4<u32>,            // z > 0: integer zoom factor; x, y: first visible column and row of the zoomed picture
+    visible_region: vec4<u32>,  // z > 0: integer zoom factor; x, y: first visible column and row of the zoomed picture
     stripes: array<vec4<f32>, 3>,
     background: vec4<f32>,      // w is 1 if the target expects linear light
 }
@@ -79,8 +79,8 @@ fn shade(place: vec2<u32>) -> vec3<f32> {
         }
     }
     let is_before = place.x < window.split;
-    let factor = window.part.z;
-    let visible = place + window.part.xy;
+    let factor = window.visible_region.z;
+    let visible = place + window.visible_region.xy;
     let whole = select(window.area.z, window.size.x * factor, factor > 0u);
     let column = select(visible.x, whole - 1u - visible.x, window.mirror == 1u);
     var color: vec3<f32>;

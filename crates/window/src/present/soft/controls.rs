@@ -12,7 +12,7 @@ use super::triangle::{self, Clip, Corner};
 use crate::present::Controls;
 
 /// Maximum number of cells per row: one bit each.
-const CELLS: usize = u64::BITS as usize;
+const MAX_CELLS: usize = u64::BITS as usize;
 /// Minimum width of a cell, in pixels.
 const MIN_CELL_PX: usize = 16;
 
@@ -43,7 +43,7 @@ impl Overlay {
             return;
         }
         self.size = size;
-        self.cell_px = size.0.div_ceil(CELLS).max(MIN_CELL_PX);
+        self.cell_px = size.0.div_ceil(MAX_CELLS).max(MIN_CELL_PX);
         self.pixels.clear();
         self.pixels.resize(size.0 * size.1, 0);
         self.cells.clear();
@@ -52,11 +52,11 @@ impl Overlay {
     }
 
     /// Replaces the controls, effective from the next [`Overlay::paint`].
-    pub fn set(&mut self, controls: Controls) {
+    pub fn set_controls(&mut self, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
         // Only the replaced controls still used these.
         self.freed.drain(..).for_each(|id| drop(self.textures.0.remove(&id)));
-        self.textures.set(&textures);
+        self.textures.apply_delta(&textures);
         self.freed.extend(&textures.free);
         textures.clear();
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
@@ -70,7 +70,7 @@ impl Overlay {
         let width = self.size.0;
         // Clears only the cells painted before.
         for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
-            for columns in runs(std::mem::take(cells), self.cell_px, width) {
+            for columns in cell_runs(std::mem::take(cells), self.cell_px, width) {
                 row[columns].fill(0);
             }
         }
@@ -78,7 +78,7 @@ impl Overlay {
         for ClippedPrimitive { clip_rect, primitive } in &primitives {
             // Callbacks need a GPU; none of the controls uses one.
             if let Primitive::Mesh(mesh) = primitive {
-                let clip = self.clip_px(*clip_rect);
+                let clip = self.to_clip_px(*clip_rect);
                 self.fill_mesh(mesh, clip);
             }
         }
@@ -86,7 +86,7 @@ impl Overlay {
     }
 
     /// Converts a clip rectangle from points to whole pixels, clamped to the window.
-    fn clip_px(&self, rect: egui::Rect) -> Clip {
+    fn to_clip_px(&self, rect: egui::Rect) -> Clip {
         let at =
             |points: f32, side_px: usize| (points * self.pixels_per_point).round().clamp(0.0, side_px as f32) as usize;
         let (width, height) = self.size;
@@ -99,23 +99,23 @@ impl Overlay {
         let Some(texture) = textures.0.get(&mesh.texture_id) else { return };
         let (width, cell_px) = (size.0, *cell_px);
         for corners in mesh.indices.as_chunks::<3>().0 {
-            let Some(corners) = corners_of(mesh, *corners, self.pixels_per_point) else { continue };
+            let Some(corners) = triangle_corners(mesh, *corners, self.pixels_per_point) else { continue };
             fill_triangle(corners, clip, texture, width, cell_px, pixels, cells);
         }
     }
 
     /// Blends the controls over row `y`.
-    pub fn blend(&self, arch: Arch, y: usize, row: &mut [u32]) {
+    pub fn blend_row(&self, arch: Arch, y: usize, row: &mut [u32]) {
         let Some(&cells) = self.cells.get(y) else { return };
         let from = &self.pixels[y * self.size.0..][..self.size.0];
-        for run in runs(cells, self.cell_px, self.size.0) {
-            arch.dispatch(Blend { from: &from[run.clone()], to: &mut row[run] });
+        for run in cell_runs(cells, self.cell_px, self.size.0) {
+            arch.dispatch(BlendRun { from: &from[run.clone()], to: &mut row[run] });
         }
     }
 }
 
 /// Returns the corners of a triangle from its vertex indices; `None` if one of them is out of range.
-fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
+fn triangle_corners(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
     let corner = |index: u32| {
         let &Vertex { pos, uv, color } = mesh.vertices.get(index as usize)?;
         let at = [pos.x * pixels_per_point, pos.y * pixels_per_point];
@@ -135,16 +135,16 @@ fn fill_triangle(
     pixels: &mut [u32],
     cells: &mut [u64],
 ) {
-    triangle::fill(corners, clip, texture, |y, columns, paint| {
+    triangle::rasterize(corners, clip, texture, |y, columns, paint| {
         let (first, last) = (columns.start / cell_px, (columns.end - 1) / cell_px);
         // The bits `first..=last`.
-        cells[y] |= (u64::MAX >> (CELLS - 1 - (last - first))) << first;
+        cells[y] |= (u64::MAX >> (MAX_CELLS - 1 - (last - first))) << first;
         paint(&mut pixels[y * width..][columns]);
     });
 }
 
 /// Returns the runs of set bits in a row's `cells` as column ranges.
-fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Range<usize>> {
+fn cell_runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Range<usize>> {
     // Cells already shifted out of `cells`.
     let mut shifted = 0;
     std::iter::from_fn(move || {
@@ -163,12 +163,12 @@ fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Ra
 }
 
 /// Blends one run of the overlay over the picture.
-struct Blend<'a> {
+struct BlendRun<'a> {
     from: &'a [u32],
     to: &'a mut [u32],
 }
 
-impl WithSimd for Blend<'_> {
+impl WithSimd for BlendRun<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn runs_are_the_cells_that_are_set() {
-        let all = |cells, width| runs(cells, 10, width).map(|run| (run.start, run.end)).collect::<Vec<_>>();
+        let all = |cells, width| cell_runs(cells, 10, width).map(|run| (run.start, run.end)).collect::<Vec<_>>();
         assert!(all(0, 100).is_empty());
         assert_eq!(all(u64::MAX, 640), [(0, 640)]);
         assert_eq!(all(1 << 63 | 0b1011, 635), [(0, 20), (30, 40), (630, 635)]);

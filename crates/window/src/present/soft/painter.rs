@@ -56,7 +56,7 @@ impl Painter {
 
     /// Replaces the controls.
     pub fn set_controls(&mut self, controls: Controls) {
-        self.overlay.set(controls);
+        self.overlay.set_controls(controls);
     }
 
     /// Paints the window into `pixels`: tightly packed rows of `0x00RRGGBB`, of the window's size.
@@ -67,8 +67,8 @@ impl Painter {
         self.overlay.paint();
         let picture = match drawing.picture {
             Image::Memory(picture) if !picture.rgb.is_empty() && drawing.area.width > 0 && drawing.area.height > 0 => {
-                if drawing.part.is_none() {
-                    self.scaler.adapt(picture, drawing.area);
+                if drawing.visible_region.is_none() {
+                    self.scaler.prepare(picture, drawing.area);
                 }
                 Some(picture)
             }
@@ -76,11 +76,11 @@ impl Painter {
         };
         let Self { arch, size: (width, _), overlay, scaler, workers, scratch, taken, .. } = self;
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
-        let window = Window { arch, width, overlay, scaler, drawing, picture };
+        let context = PaintContext { arch, width, overlay, scaler, drawing, picture };
         let bands = pixels.len().div_ceil(width * BAND_ROWS);
         let paint_band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
             for (y, row) in (band * BAND_ROWS..).zip(pixels.chunks_exact_mut(width)) {
-                window.paint_row(y, scratch, row);
+                context.paint_row(y, scratch, row);
             }
         };
         // Small windows are painted on this thread: waking others would take longer.
@@ -112,7 +112,7 @@ fn needs_threads(drawing: &Drawing) -> bool {
 }
 
 /// Data that the threads share while they paint a frame.
-struct Window<'a> {
+struct PaintContext<'a> {
     arch: Arch,
     width: usize,
     overlay: &'a Overlay,
@@ -122,7 +122,7 @@ struct Window<'a> {
     picture: Option<&'a ColorImage>,
 }
 
-impl Window<'_> {
+impl PaintContext<'_> {
     /// Paints row `y` of the window: picture and background, then the controls over them.
     fn paint_row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
         let Self { arch, width, overlay, scaler, drawing, picture } = *self;
@@ -139,6 +139,6 @@ impl Window<'_> {
             }
             None => row.fill(background),
         }
-        overlay.blend(arch, y, row);
+        overlay.blend_row(arch, y, row);
     }
 }

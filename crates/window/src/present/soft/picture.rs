@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::present::{Area, Drawing, Tone};
+use crate::present::{Area, Drawing, StaleTone};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::scale::Scale;
 
@@ -20,12 +20,12 @@ pub struct Scratch {
     /// Buffer for [`Scale::row`].
     row: Vec<u16>,
     /// A scaled row, RGB.
-    line: Vec<u8>,
+    scaled: Vec<u8>,
 }
 
 impl Scaler {
     /// Prepares for a picture and an area; both must have pixels.
-    pub fn adapt(&mut self, picture: &ColorImage, area: Area) {
+    pub fn prepare(&mut self, picture: &ColorImage, area: Area) {
         let [from, to] =
             [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
         if from != to {
@@ -48,23 +48,24 @@ impl Scaler {
             let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
             let width = drawing.area.width as usize;
             // Full width of the zoomed picture, and its first visible column.
-            let (whole, first) =
-                drawing.part.map_or((width, 0), |part| ((part.factor * picture.width) as usize, part.at.0 as usize));
+            let (whole, first) = drawing
+                .visible_region
+                .map_or((width, 0), |part| ((part.factor * picture.width) as usize, part.origin.0 as usize));
             let (start, end) = (first + columns.start, first + columns.end);
             // If mirrored, reads columns from the other side, and reverses them below.
             let from = if drawing.mirror { whole - end..whole - start } else { start..end };
-            let rgb = if let Some(part) = drawing.part {
-                scratch.line.resize(3 * from.len(), 0);
-                part.row(&picture.rgb, picture.width, part.at.1 as usize + y, from, &mut scratch.line);
-                &scratch.line[..]
+            let rgb = if let Some(part) = drawing.visible_region {
+                scratch.scaled.resize(3 * from.len(), 0);
+                part.copy_row(&picture.rgb, picture.width, part.origin.1 as usize + y, from, &mut scratch.scaled);
+                &scratch.scaled[..]
             } else if picture.size() == (drawing.area.width, drawing.area.height) {
                 &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
             } else {
-                scratch.line.resize(3 * from.len(), 0);
-                self.scale.row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.line);
-                &scratch.line[..]
+                scratch.scaled.resize(3 * from.len(), 0);
+                self.scale.row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.scaled);
+                &scratch.scaled[..]
             };
-            arch.dispatch(Expand { rgb, row });
+            arch.dispatch(ExpandRgb { rgb, row });
             if drawing.mirror {
                 row.reverse();
             }
@@ -85,18 +86,18 @@ impl Scaler {
 
     fn dim_if_stale(&self, arch: Arch, drawing: &Drawing, row: &mut [u32]) {
         if drawing.stale {
-            arch.dispatch(Stale { row });
+            arch.dispatch(DimStale { row });
         }
     }
 }
 
 /// Converts packed RGB bytes to words `0x00RRGGBB`.
-struct Expand<'a> {
+struct ExpandRgb<'a> {
     rgb: &'a [u8],
     row: &'a mut [u32],
 }
 
-impl WithSimd for Expand<'_> {
+impl WithSimd for ExpandRgb<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -106,21 +107,22 @@ impl WithSimd for Expand<'_> {
     }
 }
 
-/// Makes pixels grey and dim, with the weights of [`Tone`].
-struct Stale<'a> {
+/// Makes pixels grey and dim, with the weights of [`StaleTone`].
+struct DimStale<'a> {
     row: &'a mut [u32],
 }
 
-impl WithSimd for Stale<'_> {
+impl WithSimd for DimStale<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for pixel in self.row {
             let [r, g, b] = [*pixel >> 16 & 0xff, *pixel >> 8 & 0xff, *pixel & 0xff];
-            let [red, green, blue] = Tone::STALE_WEIGHTS;
+            let [red, green, blue] = StaleTone::LUMA_WEIGHTS;
             // Rounds the sum, and copies it to all three channels with the last factor.
-            *pixel =
-                ((red * r + green * g + blue * b + (1 << (Tone::STALE_BITS - 1))) >> Tone::STALE_BITS) * 0x0001_0101;
+            *pixel = ((red * r + green * g + blue * b + (1 << (StaleTone::FRACTION_BITS - 1)))
+                >> StaleTone::FRACTION_BITS)
+                * 0x0001_0101;
         }
     }
 }

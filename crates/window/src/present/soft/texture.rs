@@ -22,14 +22,14 @@ pub struct Textures(pub HashMap<TextureId, Texture>);
 
 impl Textures {
     /// Adds and updates textures.
-    pub fn set(&mut self, delta: &TexturesDelta) {
-        delta.set.iter().for_each(|(id, changes)| changes.iter().for_each(|change| self.apply(*id, change)));
+    pub fn apply_delta(&mut self, delta: &TexturesDelta) {
+        delta.set.iter().for_each(|(id, changes)| changes.iter().for_each(|change| self.apply_change(*id, change)));
     }
 
     /// Replaces a texture, or its region at `change.pos`. Empty or out-of-range changes are ignored.
-    fn apply(&mut self, id: TextureId, change: &ImageDelta) {
+    fn apply_change(&mut self, id: TextureId, change: &ImageDelta) {
         let ImageData::Color(image) = &change.image;
-        let texels = image.pixels.iter().map(|&color| packed(color));
+        let texels = image.pixels.iter().map(|&color| pack_argb(color));
         let [width, height] = image.size;
         if image.pixels.is_empty() {
             return;
@@ -44,14 +44,14 @@ impl Textures {
             return;
         }
         let texels: Vec<u32> = texels.collect();
-        for (row, part) in texture.texels.chunks_exact_mut(texture_width).skip(top).zip(texels.chunks_exact(width)) {
-            row[left..left + width].copy_from_slice(part);
+        for (row, changed) in texture.texels.chunks_exact_mut(texture_width).skip(top).zip(texels.chunks_exact(width)) {
+            row[left..left + width].copy_from_slice(changed);
         }
     }
 }
 
 /// Packs a colour as `0xAARRGGBB`.
-fn packed(color: Color32) -> u32 {
+fn pack_argb(color: Color32) -> u32 {
     let [r, g, b, a] = color.to_array();
     u32::from_be_bytes([a, r, g, b])
 }
@@ -64,7 +64,7 @@ impl Texture {
 
     /// Samples bilinearly at a position in texels, whose centres lie at half-integers.
     #[inline]
-    pub fn sample(&self, [x, y]: [f32; 2]) -> u32 {
+    pub fn sample_bilinear(&self, [x, y]: [f32; 2]) -> u32 {
         let (x, y) = (((x - 0.5) * SUBTEXELS).round() as i64, ((y - 0.5) * SUBTEXELS).round() as i64);
         let (parts, weight_x, weight_y) = (SUBTEXELS as i64, x & 255, y & 255);
         let (x, y) = (x.div_euclid(parts), y.div_euclid(parts));
@@ -89,15 +89,15 @@ impl Texture {
 /// and green and alpha.
 fn lerp(a: u32, b: u32, weight: u32) -> [u64; 2] {
     let pair = |color: u32| u64::from(color & 0xff) | u64::from(color >> 16 & 0xff) << 32;
-    let (rest, weight) = (u64::from(256 - weight), u64::from(weight));
-    [pair(a) * rest + pair(b) * weight, pair(a >> 8) * rest + pair(b >> 8) * weight]
+    let (inverse, weight) = (u64::from(256 - weight), u64::from(weight));
+    [pair(a) * inverse + pair(b) * weight, pair(a >> 8) * inverse + pair(b >> 8) * weight]
 }
 
 /// Interpolates between two results of [`lerp`] by `weight` / 256, rounded to `0xAARRGGBB`.
 fn lerp_rows(upper: [u64; 2], lower: [u64; 2], weight: u32) -> u32 {
-    let (rest, weight) = (u64::from(256 - weight), u64::from(weight));
+    let (inverse, weight) = (u64::from(256 - weight), u64::from(weight));
     let [low, high] = std::array::from_fn(|k| {
-        let sum = upper[k] * rest + lower[k] * weight + 0x0000_8000_0000_8000;
+        let sum = upper[k] * inverse + lower[k] * weight + 0x0000_8000_0000_8000;
         (sum >> 16 & 0xff) as u32 | ((sum >> 48 & 0xff) as u32) << 16
     });
     low | high << 8
@@ -116,7 +116,7 @@ mod tests {
         let mut delta = TexturesDelta::default();
         delta.push(TextureId::default(), ImageDelta::full(image, TextureOptions::LINEAR));
         let mut textures = Textures::default();
-        textures.set(&delta);
+        textures.apply_delta(&delta);
         delta.clear();
         textures
     }
@@ -125,11 +125,11 @@ mod tests {
     fn texels_are_met_at_their_centres_and_mixed_between() {
         let textures = texture();
         let texture = &textures.0[&TextureId::default()];
-        assert_eq!(texture.sample([0.5, 0.5]), 0);
-        assert_eq!(texture.sample([1.5, 1.5]), 0x280a_141e);
-        assert_eq!(texture.sample([1.0, 0.5]), 0x8080_8080, "half way");
-        assert_eq!(texture.sample([1.0, 1.0]), 0x8a74_5e54, "the mean of four");
-        assert_eq!(texture.sample([-9.0, 40.0]), 0xffc8_6432, "beyond the edge");
+        assert_eq!(texture.sample_bilinear([0.5, 0.5]), 0);
+        assert_eq!(texture.sample_bilinear([1.5, 1.5]), 0x280a_141e);
+        assert_eq!(texture.sample_bilinear([1.0, 0.5]), 0x8080_8080, "half way");
+        assert_eq!(texture.sample_bilinear([1.0, 1.0]), 0x8a74_5e54, "the mean of four");
+        assert_eq!(texture.sample_bilinear([-9.0, 40.0]), 0xffc8_6432, "beyond the edge");
     }
 
     #[test]
@@ -139,10 +139,13 @@ mod tests {
         let dot = ColorImage::new([1, 1], vec![Color32::RED]);
         delta.push(TextureId::default(), ImageDelta::partial([1, 0], dot.clone(), TextureOptions::LINEAR));
         delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::LINEAR));
-        textures.set(&delta);
+        textures.apply_delta(&delta);
         delta.clear();
         let texture = &textures.0[&TextureId::default()];
-        assert_eq!((texture.sample([1.5, 0.5]), texture.sample([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
+        assert_eq!(
+            (texture.sample_bilinear([1.5, 0.5]), texture.sample_bilinear([0.5, 1.5])),
+            (0xffff_0000, 0xffc8_6432)
+        );
         textures.0.remove(&TextureId::default());
         assert!(textures.0.is_empty());
     }

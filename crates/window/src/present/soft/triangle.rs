@@ -3,15 +3,15 @@
 
 use std::ops::Range;
 
-use super::blend::{over, scaled_by};
+use super::blend::{modulate, over};
 use super::texture::Texture;
 
 /// Subpixel steps per pixel. Corners are rounded to them, so that shared edges are exact, without overlaps or gaps.
 const SUBPIXELS: f32 = 256.0;
 /// A pixel in subpixels.
-const PIXEL: i64 = SUBPIXELS as i64;
+const SUBPIXELS_PER_PIXEL: i64 = SUBPIXELS as i64;
 /// Limit of coordinates, in pixels, so that products of two of them do not overflow.
-const MAX_PX: f32 = 1e6;
+const MAX_COORDINATE_PX: f32 = 1e6;
 
 /// A vertex of a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -35,28 +35,28 @@ pub struct Clip {
 
 /// Fills a triangle. Calls `on_row(y, columns, paint)` for each covered row; the callback must call `paint` with the
 /// pixels of these columns.
-pub fn fill(
+pub fn rasterize(
     corners: [Corner; 3],
     clip: Clip,
     texture: &Texture,
     mut on_row: impl FnMut(usize, Range<usize>, &dyn Fn(&mut [u32])),
 ) {
-    let Some(shape) = Shape::new(corners.map(|corner| corner.at)) else { return };
-    let paint = Paint::new(corners, texture);
+    let Some(coverage) = Coverage::new(corners.map(|corner| corner.at)) else { return };
+    let paint = TrianglePaint::new(corners, texture);
     if paint.is_invisible() {
         return;
     }
-    for y in shape.rows(clip) {
-        let columns = shape.columns(y, clip);
+    for y in coverage.covered_rows(clip) {
+        let columns = coverage.covered_columns(y, clip);
         if !columns.is_empty() {
             let x = columns.start;
-            on_row(y, columns, &|pixels| paint.fill(x, y, pixels, texture));
+            on_row(y, columns, &|pixels| paint.fill_row(x, y, pixels, texture));
         }
     }
 }
 
 /// Coverage of a triangle, in exact integer arithmetic.
-struct Shape {
+struct Coverage {
     edges: [Edge; 3],
     /// y of the highest and of the lowest corner, in subpixels.
     top: i64,
@@ -71,13 +71,14 @@ struct Edge {
     down: i64,
 }
 
-impl Shape {
+impl Coverage {
     /// Returns `None` if the triangle has no area or a corner is not finite.
     fn new(corners: [[f32; 2]; 3]) -> Option<Self> {
         if corners.as_flattened().iter().any(|value| !value.is_finite()) {
             return None;
         }
-        let mut corners = corners.map(|corner| corner.map(|v| (v.clamp(-MAX_PX, MAX_PX) * SUBPIXELS).round() as i64));
+        let mut corners = corners
+            .map(|corner| corner.map(|v| (v.clamp(-MAX_COORDINATE_PX, MAX_COORDINATE_PX) * SUBPIXELS).round() as i64));
         let [a, b, c] = corners;
         match (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) {
             0 => return None,
@@ -90,8 +91,8 @@ impl Shape {
             // Top-left rule: a centre on a shared edge belongs to the triangle below it or right of it.
             let is_top_left = dy < 0 || (dy == 0 && dx > 0);
             let side = |x: i64, y: i64| dx * (y - from[1]) - dy * (x - from[0]);
-            let start = side(PIXEL / 2, PIXEL / 2) - i64::from(!is_top_left);
-            Edge { start, across: -dy * PIXEL, down: dx * PIXEL }
+            let start = side(SUBPIXELS_PER_PIXEL / 2, SUBPIXELS_PER_PIXEL / 2) - i64::from(!is_top_left);
+            Edge { start, across: -dy * SUBPIXELS_PER_PIXEL, down: dx * SUBPIXELS_PER_PIXEL }
         };
         let [a, b, c] = corners;
         let rows = corners.map(|corner| corner[1]);
@@ -100,13 +101,13 @@ impl Shape {
     }
 
     /// Returns the rows that may be covered.
-    fn rows(&self, clip: Clip) -> Range<usize> {
+    fn covered_rows(&self, clip: Clip) -> Range<usize> {
         let within = |row: i64| row.clamp(clip.top as i64, clip.bottom as i64) as usize;
-        within(self.top.div_euclid(PIXEL))..within(self.bottom.div_euclid(PIXEL) + 1)
+        within(self.top.div_euclid(SUBPIXELS_PER_PIXEL))..within(self.bottom.div_euclid(SUBPIXELS_PER_PIXEL) + 1)
     }
 
     /// Returns the columns of row `y` whose centres lie inside all three edges.
-    fn columns(&self, y: usize, clip: Clip) -> Range<usize> {
+    fn covered_columns(&self, y: usize, clip: Clip) -> Range<usize> {
         let (mut left, mut right) = (clip.left as i64, clip.right as i64);
         for edge in &self.edges {
             let start = edge.start + y as i64 * edge.down;
@@ -133,7 +134,7 @@ struct Plane {
 
 impl Plane {
     /// Returns the plane with these values at three points; constant if the points are nearly collinear.
-    fn through(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
+    fn through_points(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
         let (ab, ac) = ([at[1][0] - at[0][0], at[1][1] - at[0][1]], [at[2][0] - at[0][0], at[2][1] - at[0][1]]);
         let area = ab[0] * ac[1] - ab[1] * ac[0];
         let (b, c) = (values[1] - values[0], values[2] - values[0]);
@@ -145,13 +146,13 @@ impl Plane {
     }
 
     /// Evaluates the plane at the centre of a pixel.
-    fn at(&self, x: usize, y: usize) -> f32 {
+    fn eval(&self, x: usize, y: usize) -> f32 {
         self.start + self.across * (x as f32 + 0.5) + self.down * (y as f32 + 0.5)
     }
 }
 
 /// Colour and texture of a triangle, prepared for interpolation.
-struct Paint {
+struct TrianglePaint {
     /// The colour of all corners, if it is the same.
     flat_color: Option<[u8; 4]>,
     /// Planes of red, green, blue and alpha otherwise.
@@ -162,7 +163,7 @@ struct Paint {
     texel_at: [Plane; 2],
 }
 
-impl Paint {
+impl TrianglePaint {
     /// Prepares interpolation of the attributes that differ between the corners.
     fn new(corners: [Corner; 3], texture: &Texture) -> Self {
         let [a, b, c] = corners;
@@ -175,13 +176,13 @@ impl Paint {
         };
         if paint.flat_color.is_none() {
             paint.colors =
-                std::array::from_fn(|k| Plane::through(at, corners.map(|corner| f32::from(corner.color[k]))));
+                std::array::from_fn(|k| Plane::through_points(at, corners.map(|corner| f32::from(corner.color[k]))));
         }
         let uv = corners.map(|corner| texture.to_texels(corner.uv));
         if a.uv == b.uv && b.uv == c.uv {
-            paint.texel = Some(texture.sample(uv[0]));
+            paint.texel = Some(texture.sample_bilinear(uv[0]));
         } else {
-            paint.texel_at = std::array::from_fn(|k| Plane::through(at, uv.map(|uv| uv[k])));
+            paint.texel_at = std::array::from_fn(|k| Plane::through_points(at, uv.map(|uv| uv[k])));
         }
         paint
     }
@@ -192,10 +193,10 @@ impl Paint {
 
     /// Blends the triangle over `pixels`, which begin at column `x` of row `y`. The first two cases are fast paths for
     /// the most frequent triangles.
-    fn fill(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
+    fn fill_row(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
         match (self.flat_color, self.texel) {
             (Some(color), Some(texel)) => {
-                let color = scaled_by(texel, color);
+                let color = modulate(texel, color);
                 if color >> 24 == 255 {
                     pixels.fill(color);
                 } else {
@@ -206,18 +207,18 @@ impl Paint {
             (None, Some(u32::MAX)) => {
                 let (mut color, step) = self.color_at(x, y);
                 for pixel in pixels {
-                    *pixel = over(packed(color), *pixel);
+                    *pixel = over(pack_argb(color), *pixel);
                     color = std::array::from_fn(|k| color[k] + step[k]);
                 }
             }
             (flat_color, texel) => {
                 let (mut color, step) = self.color_at(x, y);
-                let mut at = self.texel_at.map(|plane| plane.at(x, y));
+                let mut at = self.texel_at.map(|plane| plane.eval(x, y));
                 for pixel in pixels {
-                    let texel = texel.unwrap_or_else(|| texture.sample(at));
+                    let texel = texel.unwrap_or_else(|| texture.sample_bilinear(at));
                     if texel != 0 {
-                        let color = flat_color.unwrap_or_else(|| rounded(color));
-                        *pixel = over(scaled_by(texel, color), *pixel);
+                        let color = flat_color.unwrap_or_else(|| round_color(color));
+                        *pixel = over(modulate(texel, color), *pixel);
                     }
                     color = std::array::from_fn(|k| color[k] + step[k]);
                     at = std::array::from_fn(|k| at[k] + self.texel_at[k].across);
@@ -228,18 +229,18 @@ impl Paint {
 
     /// Returns the colour at a pixel, and its increment per column.
     fn color_at(&self, x: usize, y: usize) -> ([f32; 4], [f32; 4]) {
-        (self.colors.map(|plane| plane.at(x, y)), self.colors.map(|plane| plane.across))
+        (self.colors.map(|plane| plane.eval(x, y)), self.colors.map(|plane| plane.across))
     }
 }
 
 /// Rounds to bytes; the cast saturates.
-fn rounded(color: [f32; 4]) -> [u8; 4] {
+fn round_color(color: [f32; 4]) -> [u8; 4] {
     color.map(|value| (value + 0.5) as u8)
 }
 
 /// Packs a colour (red, green, blue, alpha) as `0xAARRGGBB`.
-fn packed(color: [f32; 4]) -> u32 {
-    let [r, g, b, a] = rounded(color);
+fn pack_argb(color: [f32; 4]) -> u32 {
+    let [r, g, b, a] = round_color(color);
     u32::from_be_bytes([a, r, g, b])
 }
 
@@ -250,10 +251,10 @@ mod tests {
     const SIZE: usize = 40;
 
     fn covered(corners: [[f32; 2]; 3], counts: &mut [u32]) {
-        let Some(shape) = Shape::new(corners) else { return };
+        let Some(coverage) = Coverage::new(corners) else { return };
         let clip = Clip { left: 0, top: 0, right: SIZE, bottom: SIZE };
-        for y in shape.rows(clip) {
-            shape.columns(y, clip).for_each(|x| counts[y * SIZE + x] += 1);
+        for y in coverage.covered_rows(clip) {
+            coverage.covered_columns(y, clip).for_each(|x| counts[y * SIZE + x] += 1);
         }
     }
 

@@ -12,7 +12,7 @@ use super::App;
 use crate::remote_changes::RemoteChanges;
 use crate::session::{CurrentShutter, SnapshotRequest};
 use crate::state::{Action, DepthMethod, Running, Source};
-use crate::window::{Control, UserEvent};
+use crate::window::{RemoteConfig, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
 use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
 use bokehcam::look::{Look, Patch};
@@ -26,10 +26,10 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
 type Task = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
 
 /// Handle with which remote control reaches the window.
-struct Remote {
+struct RemoteHandle {
     tasks: Sender<Task>,
     proxy: EventLoopProxy<UserEvent>,
-    release: CurrentShutter,
+    shutter: CurrentShutter,
 }
 
 /// The control server, and its state on the window's side.
@@ -44,14 +44,14 @@ pub(super) struct RemoteControl {
 }
 
 impl RemoteControl {
-    pub fn begin(
-        Control { claim, rules }: Control,
-        release: CurrentShutter,
+    pub fn start(
+        RemoteConfig { claim, rules }: RemoteConfig,
+        shutter: CurrentShutter,
         proxy: &EventLoopProxy<UserEvent>,
     ) -> std::io::Result<Self> {
         let (to, tasks) = mpsc::channel();
-        let remote = Remote { tasks: to, proxy: proxy.clone(), release };
-        let handler = Controller::create_handler(claim.name().clone(), "preview", rules, remote);
+        let handle = RemoteHandle { tasks: to, proxy: proxy.clone(), shutter };
+        let handler = Controller::create_handler(claim.name().clone(), "preview", rules, handle);
         Ok(Self { tasks, _server: claim.serve(handler)?, remote_changes: RemoteChanges::default(), request: None })
     }
 
@@ -61,7 +61,7 @@ impl RemoteControl {
     }
 }
 
-impl Remote {
+impl RemoteHandle {
     /// Runs a closure on the window's thread, and waits for its result.
     fn run_on_window<T: Send + 'static>(
         &self,
@@ -82,7 +82,7 @@ fn receive_reply<T>(from: &Receiver<T>) -> Result<T, Answer> {
     from.recv_timeout(REPLY_TIMEOUT).map_err(|_| Answer::failed("the window does not answer in time"))
 }
 
-impl ControllableRun for Remote {
+impl ControllableRun for RemoteHandle {
     fn status(&self) -> Result<Status, Answer> {
         self.run_on_window(|app, _| app.status())
     }
@@ -96,7 +96,7 @@ impl ControllableRun for Remote {
     }
 
     fn shutter(&self) -> Option<ShutterControl> {
-        self.release.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.shutter.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
@@ -141,9 +141,9 @@ impl App {
             _ => None,
         };
         let look = self.state.patch_look(patch).map_err(Answer::invalid_request)?;
-        let before = self.state.look_as_chosen();
+        let before = self.state.chosen_look();
         self.perform_action(Action::Look { look: Box::new(look), stroke: None }, events);
-        let after = self.state.look_as_chosen();
+        let after = self.state.chosen_look();
         self.remote_control.iter_mut().for_each(|remote| remote.remote_changes.record(&before, &after));
         Ok(note)
     }
@@ -163,7 +163,7 @@ impl App {
 
     /// Returns the look to be saved: without changes by remote control.
     pub(super) fn look_to_save(&self) -> Look {
-        let look = self.state.look_as_chosen();
+        let look = self.state.chosen_look();
         self.remote_control.as_ref().map_or_else(|| look.clone(), |remote| remote.remote_changes.remove_from(&look))
     }
 
@@ -188,7 +188,7 @@ impl App {
         self.off.store(off, Ordering::Release);
         self.last_frame_at = Instant::now();
         if off {
-            (self.view, self.held, self.snapshot_due) = (None, None, false);
+            (self.view, self.held_number, self.snapshot_due) = (None, None, false);
             self.session.release_frame();
         }
     }

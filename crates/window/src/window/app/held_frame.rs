@@ -23,19 +23,19 @@ impl App {
     /// Starts or ends holding the displayed picture, so that the session blurs it with every new look.
     pub(super) fn update_held_frame(&mut self) {
         if !self.state.is_picture_static() {
-            if self.held.take().is_some() {
+            if self.held_number.take().is_some() {
                 self.session.release_frame();
             }
             return;
         }
-        let Some(view) = self.view.as_ref().filter(|_| self.held.is_none()) else { return };
+        let Some(view) = self.view.as_ref().filter(|_| self.held_number.is_none()) else { return };
         // While frames arrive, those that are only on the GPU are replaced, because a held frame must be in memory.
         if view.picture.memory().is_none() && matches!(self.state.source, Source::Running(_)) {
             return;
         }
-        let Some(still) = capture_still(view, self.holds + 1) else { return };
-        self.holds = still.number;
-        self.held = Some(still.number);
+        let Some(still) = capture_still(view, self.last_still_number + 1) else { return };
+        self.last_still_number = still.number;
+        self.held_number = Some(still.number);
         // A settled photo is blurred again because live frames use a lower quality level.
         let is_outdated = view.is_transitional || self.snapshot_due || self.state.shows_final_photo;
         self.session.hold_frame(still, is_outdated);
@@ -49,7 +49,7 @@ impl App {
     /// Shows the held picture with another look. Returns false if another picture is held by now.
     pub(super) fn show_reblurred(&mut self, still: Still) -> bool {
         let Still { number, images: Images { depth, blurred, .. }, coc, change, quality } = still;
-        let Some(view) = self.view.as_mut().filter(|_| self.held == Some(number)) else { return false };
+        let Some(view) = self.view.as_mut().filter(|_| self.held_number == Some(number)) else { return false };
         if view.color.is_none() {
             view.color = view.picture.memory().cloned().map(Pooled::detached);
         }
@@ -57,7 +57,7 @@ impl App {
         view.depth = depth.map(Pooled::detached);
         (view.coc, view.change, view.is_transitional, view.trace.quality) = (coc, change, false, quality);
         (self.state.focus_m, self.state.is_transitional) = (focus_distance_m(&coc), false);
-        self.drawn = None;
+        self.drawn_view = None;
         if self.snapshot_due {
             self.save_snapshot();
         }

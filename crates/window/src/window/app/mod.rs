@@ -23,8 +23,8 @@ use super::saved_state::SavedState;
 use super::{Preview, PreviewOutcome, UserEvent, WindowError};
 use crate::meters::Totals;
 use crate::panel::{Panel, SystemFonts};
-use crate::session::{Closed, Session, Wake};
-use crate::state::{Action, Shown, Source, State};
+use crate::session::{Session, SessionOutcome, Wake};
+use crate::state::{Action, Source, State, ViewMode};
 use crate::views::Views;
 use bokehcam::bokeh;
 use bokehcam::clock::Clock;
@@ -64,16 +64,16 @@ pub(super) struct App {
     view_is_new: bool,
     false_colors: Views,
     /// The view that `false_colors` drew last; `None` after a new frame.
-    drawn: Option<Shown>,
+    drawn_view: Option<ViewMode>,
     /// Number of the held frame, and the highest number so far.
-    held: Option<u64>,
-    holds: u64,
+    held_number: Option<u64>,
+    last_still_number: u64,
     /// Keeps the source running.
     watch: Option<Watch>,
     demand: Demand,
     /// Settings of the current look's blur.
     settings: Option<bokeh::Settings>,
-    blank: ColorImage,
+    blank_picture: ColorImage,
     /// The still card, shown while the picture is off.
     card: ColorImage,
     clock: Clock,
@@ -81,16 +81,16 @@ pub(super) struct App {
     last_frame_at: Instant,
     /// Time of the next layout of the controls, and of the last one.
     layout_at: Option<Instant>,
-    laid_out: Instant,
+    laid_out_at: Instant,
     /// Time of the oldest input whose effect is not displayed yet.
     input_at: Option<Instant>,
     /// Whether a path was dropped in this event batch: files of one drop arrive one after the other.
     has_dropped: bool,
-    /// Whether the window is fully covered; `empty` is whether it has zero size.
+    /// Whether the window is fully covered; `has_zero_size` is whether it has zero size.
     covered: bool,
     /// Time since which the window is invisible.
     hidden_at: Option<Instant>,
-    empty: bool,
+    has_zero_size: bool,
     /// Persistent state of the window, and its file.
     saved_state: SavedState,
     saved_state_file: Option<PathBuf>,
@@ -118,8 +118,8 @@ impl App {
             }
         });
         let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
-        let begin = |control| control::RemoteControl::begin(control, Arc::clone(&session.release), &proxy);
-        let remote_control = control.map(begin).transpose()?;
+        let start = |control| control::RemoteControl::start(control, Arc::clone(&session.shutter), &proxy);
+        let remote_control = control.map(start).transpose()?;
         let off = Arc::clone(&session.off);
         let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
         let clock = Clock::system();
@@ -144,23 +144,23 @@ impl App {
             view: None,
             view_is_new: false,
             false_colors: Views::default(),
-            drawn: None,
-            held: None,
-            holds: 0,
+            drawn_view: None,
+            held_number: None,
+            last_still_number: 0,
             watch: Some(demand.watch()),
             demand,
             settings: None,
-            blank: ColorImage::new(16, 9),
+            blank_picture: ColorImage::new(16, 9),
             card: ColorImage::new(0, 0),
             clock,
             last_frame_at: Instant::now(),
             layout_at: Some(Instant::now()),
-            laid_out: Instant::now(),
+            laid_out_at: Instant::now(),
             input_at: None,
             has_dropped: false,
             covered: false,
             hidden_at: None,
-            empty: false,
+            has_zero_size: false,
             saved_state,
             saved_state_file,
             close_at_end,
@@ -178,18 +178,18 @@ impl App {
         drop(remote_control);
         // Closes the window immediately; completing the outputs may take a while.
         drop((gfx, view));
-        let Closed { mut report, failed: unwritten } = session.close();
+        let SessionOutcome { mut report, output_error } = session.close();
         // Only after the session: without a receiver, the last frames would be counted as neither delivered nor
         // dropped.
         drop(frames);
         if let Some(report) = &mut report {
             report.window = Some(window_use(&state));
         }
-        let lost = match state.source {
+        let source_error = match state.source {
             Source::Lost(why) => Some(why),
             _ => None,
         };
-        failed.map_or(Ok(PreviewOutcome { report, lost, unwritten }), Err)
+        failed.map_or(Ok(PreviewOutcome { report, source_error, output_error }), Err)
     }
 
     fn set_title(&self) {
@@ -248,7 +248,8 @@ impl ApplicationHandler<UserEvent> for App {
         let Some(gfx) = &mut self.gfx else { return };
         match &event {
             WindowEvent::RedrawRequested => {
-                let due = self.state.instruments && self.view_is_new && self.laid_out.elapsed() >= INSTRUMENTS_PERIOD;
+                let due =
+                    self.state.instruments && self.view_is_new && self.laid_out_at.elapsed() >= INSTRUMENTS_PERIOD;
                 if due || self.layout_at.is_some_and(|at| at <= Instant::now()) {
                     self.lay_out(events);
                 }
@@ -267,8 +268,8 @@ impl ApplicationHandler<UserEvent> for App {
             }
             WindowEvent::Resized(size) => {
                 gfx.presenter.resize((size.width, size.height));
-                self.empty = size.width == 0 || size.height == 0;
-                self.saved_state.size = gfx.size().or(self.saved_state.size);
+                self.has_zero_size = size.width == 0 || size.height == 0;
+                self.saved_state.size = gfx.size_to_save().or(self.saved_state.size);
             }
             _ => {}
         }
@@ -304,7 +305,7 @@ impl ApplicationHandler<UserEvent> for App {
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
         let Some(path) = &self.saved_state_file else { return };
-        self.saved_state.size = self.gfx.as_ref().and_then(Gfx::size).or(self.saved_state.size);
+        self.saved_state.size = self.gfx.as_ref().and_then(Gfx::size_to_save).or(self.saved_state.size);
         self.saved_state.preferences = self.state.preferences.clone();
         self.saved_state.set_source(&self.state.source_name);
         self.saved_state.set_look(&self.look_to_save());

@@ -73,7 +73,7 @@ impl App {
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seek_state.is_requested_frame(view)) {
             self.update_position(&view);
-            if self.state.transport.is_some() && self.laid_out.elapsed() > POSITION_PERIOD {
+            if self.state.transport.is_some() && self.laid_out_at.elapsed() > POSITION_PERIOD {
                 self.layout_at = Some(Instant::now());
             }
             self.update_from_frame(&view);
@@ -82,7 +82,7 @@ impl App {
             let may_settle = self.state.is_photo() && !self.close_at_end;
             self.state.shows_final_photo = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);
             // The new frame must be held anew.
-            self.held = None;
+            self.held_number = None;
             self.view = Some(view);
             self.view_is_new = true;
             changed = true;

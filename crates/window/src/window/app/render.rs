@@ -33,7 +33,7 @@ impl App {
     }
 
     pub(super) fn is_hidden(&self) -> bool {
-        self.covered || self.empty
+        self.covered || self.has_zero_size
     }
 
     pub(super) fn picture_size(&self) -> (u32, u32) {
@@ -48,9 +48,9 @@ impl App {
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
-        let room = panel::picture_area_px(&self.ctx);
-        let (area, part) = gfx.area(size, room, self.state.zoom, self.state.mirror);
-        let canvas = Canvas { area, size, part };
+        let available = panel::picture_area_px(&self.ctx);
+        let (area, visible_region) = gfx.picture_area(size, available, self.state.zoom, self.state.mirror);
+        let canvas = Canvas { area, size, visible_region };
         let input = gfx.input.take_egui_input(&gfx.window);
         let mut actions = Vec::new();
         let (controls, state) = (&mut self.panel, &self.state);
@@ -59,22 +59,22 @@ impl App {
         let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let pixels_per_point = output.pixels_per_point;
         gfx.presenter.set_controls(Controls { primitives, textures: output.textures_delta, pixels_per_point });
-        self.laid_out = Instant::now();
+        self.laid_out_at = Instant::now();
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
-        self.layout_at = self.laid_out.checked_add(wait);
-        let probe = self.panel.probed.and_then(|at| Some(Probe::of(self.view.as_ref()?, at)));
+        self.layout_at = self.laid_out_at.checked_add(wait);
+        let probe = self.panel.probed.and_then(|at| Some(Probe::read(self.view.as_ref()?, at)));
         if std::mem::replace(&mut self.state.probe, probe) != probe {
-            self.layout_at = Some(self.laid_out);
+            self.layout_at = Some(self.laid_out_at);
             gfx.window.request_redraw();
         }
         // A change of the panel's size moves the picture and its overlays: lay out again.
-        if panel::picture_area_px(&self.ctx) != room {
-            self.layout_at = Some(self.laid_out);
+        if panel::picture_area_px(&self.ctx) != available {
+            self.layout_at = Some(self.laid_out_at);
             gfx.window.request_redraw();
         }
         if !actions.is_empty() {
             // Lays out again immediately, to show their effect.
-            self.layout_at = Some(self.laid_out);
+            self.layout_at = Some(self.laid_out_at);
             actions.into_iter().for_each(|action| self.perform_action(action, events));
             self.request_redraw();
         }
@@ -112,7 +112,7 @@ impl App {
 
     /// Sets where the pipeline must deliver pictures. They are read back from the GPU only for uses other than drawing.
     pub(super) fn update_output_request(&self) {
-        let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
+        let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.uses_gpu());
         let used_in_memory =
             self.state.frozen || self.state.is_photo() || self.snapshot_due || !self.state.outputs.is_empty();
         self.output_request.set_place(match (drawn_on_gpu, used_in_memory) {
@@ -132,9 +132,10 @@ impl App {
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        let (between, depth_held) = (view.is_transitional, view.trace.is_depth_reused);
+        let (is_transitional, is_depth_reused) = (view.is_transitional, view.trace.is_depth_reused);
         let is_frozen = self.state.is_picture_static() && view.picture.memory().is_some();
-        self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
+        self.snapshot_due =
+            view.picture.memory().is_none() || is_running && (is_transitional || is_depth_reused && !is_frozen);
         self.update_output_request();
         let Some(still) = capture_still(view, 0).filter(|_| !self.snapshot_due) else { return };
         let request = self.remote_control.as_mut().and_then(control::RemoteControl::take_request);
@@ -147,9 +148,9 @@ impl App {
         let hidden = self.is_hidden();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
         let shown = self.state.shown;
-        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != Some(shown)) {
+        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn_view != Some(shown)) {
             self.false_colors.draw(shown, view, self.settings.as_ref());
-            self.drawn = Some(shown);
+            self.drawn_view = Some(shown);
             self.state.legend = self.false_colors.legend();
         }
         let false_colors = self.state.legend.map(|_| self.false_colors.image());
@@ -160,17 +161,18 @@ impl App {
             self.card = ColorImage::new(size.0, size.1);
             card::draw_card(&mut self.card);
         }
-        let none = if self.state.off { &self.card } else { &self.blank };
+        let none = if self.state.off { &self.card } else { &self.blank_picture };
         let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(none);
         let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.supports(there));
         let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
         // If nothing was blurred, before and after are identical.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
-        let (area, part) = gfx.area(size, panel::picture_area_px(&self.ctx), self.state.zoom, *mirror);
+        let (area, visible_region) =
+            gfx.picture_area(size, panel::picture_area_px(&self.ctx), self.state.zoom, *mirror);
         let drawing = Drawing {
             area: if self.view.is_some() || self.state.off { area } else { Area::default() },
-            part,
+            visible_region,
             picture: false_colors.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,
@@ -178,12 +180,12 @@ impl App {
             background,
         };
         let began_ns = self.clock.now_ns();
-        let drawn_on_gpu = gfx.presenter.has_device();
+        let drawn_on_gpu = gfx.presenter.uses_gpu();
         if let Err(error) = gfx.presenter.present(&drawing) {
             self.failed = Some(error.into());
             return events.exit();
         }
-        if drawn_on_gpu && !gfx.presenter.has_device() {
+        if drawn_on_gpu && !gfx.presenter.uses_gpu() {
             self.update_output_request();
             self.state.note(GPU_FAILED);
         }

@@ -39,8 +39,8 @@ impl App {
     /// Updates the playback position with that of the displayed frame.
     pub(super) fn update_position(&mut self, view: &View) {
         self.seek_state.displayed = view.seek;
-        let is_behind = self.seek_state.displayed < self.seek_state.requested;
-        if let Some(seeker) = self.seek_state.seeker.as_ref().filter(|_| !is_behind) {
+        let is_seek_pending = self.seek_state.displayed < self.seek_state.requested;
+        if let Some(seeker) = self.seek_state.seeker.as_ref().filter(|_| !is_seek_pending) {
             self.set_position(seeker.position_of(view.stamp));
         }
     }

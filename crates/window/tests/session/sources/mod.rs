@@ -45,7 +45,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     }
     watched.session.send(Request::StopOutput(output));
     let closed = watched.heard.session.close();
-    assert_eq!(closed.failed, None);
+    assert_eq!(closed.output_error, None);
     assert!(closed.report.unwrap().frames.balance());
     assert!(film.metadata().unwrap().len() > 48 * 32 * 3 / 2, "the film is there");
 }

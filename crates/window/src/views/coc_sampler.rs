@@ -4,7 +4,7 @@ use bokehcam::frame::DepthMap;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 
 /// Source of each pixel's CoC.
-pub enum Field<'a> {
+pub enum CocSampler<'a> {
     /// The same radius everywhere, in pixels.
     Uniform(f32),
     Ramp(Ramp),
@@ -12,9 +12,9 @@ pub enum Field<'a> {
     Depth(&'a DepthMap, DepthCoc),
 }
 
-impl<'a> Field<'a> {
-    /// Creates the field of a picture of `size` pixels. Fills `columns` with the depth map's column for each of the
-    /// picture's. `None` if the field needs depth and has no map.
+impl<'a> CocSampler<'a> {
+    /// Creates the sampler of a picture of `size` pixels. Fills `columns` with the depth map's column for each of the
+    /// picture's. `None` if the CoC needs depth and has no map.
     pub fn new(coc: &CocField, depth: Option<&'a DepthMap>, size: (u32, u32), columns: &mut Vec<u32>) -> Option<Self> {
         let map_columns = depth.map_or(size.0, |depth| depth.width);
         columns.clear();
