@@ -225,7 +225,7 @@ mod tests {
         meters.set_start(1_000);
         for k in 0..frames {
             let trace = Trace { blur_ns: 1_000_000 * k, quality: Some(Quality::Fast), ..Trace::default() };
-            meters.count(&trace, 1_000 + (k + 1) * PERIOD_NS, 5_000_000 + k * 1_000, 2_000_000);
+            meters.record_times(&trace, 1_000 + (k + 1) * PERIOD_NS, 5_000_000 + k * 1_000, 2_000_000);
         }
         meters
     }
@@ -260,7 +260,7 @@ mod tests {
         meters.clear_recent();
         assert_eq!((meters.samples().len(), meters.summary()), (0, Summary::default()));
         assert_eq!((meters.totals.presented, meters.totals.reaction.samples()), (10, 1));
-        meters.count(&Trace::default(), 10 * PERIOD_NS, 1, 1);
+        meters.record_times(&Trace::default(), 10 * PERIOD_NS, 1, 1);
         assert_eq!(meters.totals.first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
     }
 
@@ -270,7 +270,7 @@ mod tests {
         assert!((meters.stages.present_ms - 2.0).abs() < 1e-9);
         let mut passes = bokehcam::bokeh::PassTimes::new();
         passes.add("blur", std::time::Duration::from_millis(7));
-        meters.count(&Trace { passes, ..Trace::default() }, 1, 1, 1);
+        meters.record_times(&Trace { passes, ..Trace::default() }, 1, 1, 1);
         assert_eq!(meters.stages.passes, [("blur", 7.0)]);
     }
 
@@ -290,7 +290,7 @@ mod tests {
                     ..Trace::default()
                 };
                 // 3 ms from the pipeline to the window, and 2 ms to present.
-                meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
+                meters.record_times(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
             }
             let stages = meters.stages;
             let parts = [stages.depth_ms, stages.blur_ms, stages.queueing_ms, stages.playout_ms, stages.present_ms];

@@ -107,7 +107,7 @@ enum Command {
     SaveFrame(Box<Still>, SaveOptions),
     HoldFrame(Box<Still>, bool),
     ReleaseFrame,
-    CopyCommand(Vec<CliOption>),
+    CopyText(Vec<CliOption>),
     /// An event of an output of the run with this number.
     OutputEvent(u64, MemberEvent),
     /// The run with this number ended.
@@ -160,7 +160,7 @@ impl Session {
 
     /// Requests the equivalent command for the clipboard; `cli_options` are the window's options.
     pub fn copy_command(&self, cli_options: Vec<CliOption>) {
-        let _ = self.commands.send(Command::CopyCommand(cli_options));
+        let _ = self.commands.send(Command::CopyText(cli_options));
     }
 
     /// Returns the next event without blocking.

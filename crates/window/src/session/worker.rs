@@ -88,7 +88,7 @@ impl SessionWorker {
                     Command::SaveFrame(still, saving) => self.save_frame(&still, &saving),
                     Command::HoldFrame(still, is_outdated) => self.hold_frame(*still, is_outdated),
                     Command::ReleaseFrame => self.held = None,
-                    Command::CopyCommand(cli_options) => self.copy_command(&cli_options),
+                    Command::CopyText(cli_options) => self.copy_command(&cli_options),
                     Command::OutputEvent(run, notice) => self.handle_output_event(run, &notice),
                     Command::RunEnded(run, ended) => self.handle_run_end(run, *ended),
                     Command::Close => return self.close(inbox),

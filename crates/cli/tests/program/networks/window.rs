@@ -67,6 +67,6 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
     assert!(is_installed || none.unwrap_err().contains("`bokehcam models get`"));
     assert!(system.check_depth_method(PORTRAIT, DepthMethod::Stereo).is_err(), "it has one camera");
     let flags = [DepthMethod::Measured, DepthMethod::Stereo, DepthMethod::Person, DepthMethod::PersonAndMonoDepth]
-        .map(DepthMethod::flag);
+        .map(DepthMethod::depth_option);
     assert_eq!(flags, ["recorded", "stereo", "matte", "matte,mono"]);
 }
