@@ -126,7 +126,7 @@ fn desktops_find_the_program_its_icon_and_its_version() {
         roxmltree::Document::parse(&icon).unwrap().root_element().has_tag_name(("http://www.w3.org/2000/svg", "svg"))
     );
     // The window's class must match this desktop file.
-    let class = format!("const CLASS: &str = \"{}\";", value(&entry, "StartupWMClass"));
+    let class = format!("const APP_ID: &str = \"{}\";", value(&entry, "StartupWMClass"));
     assert!(here("crates/window/src/window/gfx.rs").contains(&class), "{class}");
 
     let id = "io.github.bokehcam.bokehcam";
