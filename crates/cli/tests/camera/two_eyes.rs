@@ -66,5 +66,5 @@ fn cameras_without_a_size_in_common_are_refused() {
     // A webcam's fixed sizes do not match the other camera's HDMI size.
     sh("v4l2-ctl -d /dev/video0 -i 0 && v4l2-ctl -d /dev/video0 --set-fmt-video width=640,height=360");
     let ran = run("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null");
-    assert!(ran.code != 0 && ran.stderr.contains("both need the same size"), "{}", ran.stderr);
+    assert!(ran.code != 0 && ran.stderr.contains("both cameras need the same size"), "{}", ran.stderr);
 }

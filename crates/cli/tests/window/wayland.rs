@@ -23,21 +23,34 @@ fn compositor(screen: &Screen, folder: &Path) -> Beside {
     weston
 }
 
+/// Shows the recording in a compositor. Returns whether the compositor lived: once in a while Weston ends by itself, and
+/// takes its screen with it.
+fn shows_the_picture(backend: &[&str]) -> bool {
+    let (screen, home) = (Screen::new(), Home::new());
+    let mut weston = compositor(&screen, &home.path("run"));
+    let mut command = home.within(tied(PROGRAM));
+    command.args(["preview", PORTRAIT, "--panel=false", "--report", "report.json"]).args(backend);
+    command.env("WAYLAND_DISPLAY", SOCKET).env_remove("DISPLAY").env("HOME", home.0.path());
+    // GPU drivers are found there.
+    command.env_remove("XDG_DATA_DIRS");
+    let program = Beside::start(command.stdout(Stdio::null()).stderr(Stdio::null()));
+    let mut lived = true;
+    Window { screen: &screen, id: screen.root }.until("a photograph", |image| {
+        lived = weston.runs();
+        !lived || is_photograph(image)
+    });
+    if lived {
+        program.end_by(Signal::INT, PATIENCE).done();
+        let report = json(home.path("report.json"));
+        assert!(report["window"]["presented"].as_u64().unwrap() > 0, "{report}");
+    }
+    lived
+}
+
 #[test]
 #[ignore = "needs an X server"]
 fn a_window_on_wayland_shows_the_picture_by_processor_and_by_gpu() {
     for backend in [&["--backend", "cpu"][..], &["--backend", "gpu", "--adapter", "llvmpipe"]] {
-        let (screen, home) = (Screen::new(), Home::new());
-        let _weston = compositor(&screen, &home.path("run"));
-        let mut command = home.within(tied(PROGRAM));
-        command.args(["preview", PORTRAIT, "--panel=false", "--report", "report.json"]).args(backend);
-        command.env("WAYLAND_DISPLAY", SOCKET).env_remove("DISPLAY").env("HOME", home.0.path());
-        // GPU drivers are found there.
-        command.env_remove("XDG_DATA_DIRS");
-        let program = Beside::start(command.stdout(Stdio::null()).stderr(Stdio::null()));
-        Window { screen: &screen, id: screen.root }.until("a photograph", is_photograph);
-        program.end_by(Signal::INT, PATIENCE).done();
-        let report = json(home.path("report.json"));
-        assert!(report["window"]["presented"].as_u64().unwrap() > 0, "{report}");
+        assert!((0..3).any(|_| shows_the_picture(backend)), "Weston ended by itself three times");
     }
 }
