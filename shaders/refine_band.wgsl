@@ -1,6 +1,6 @@
 // Pass refine_band: finds depth edges, and the band around them in which depths may be wrong; packs the votes. Begins
 // the worklist: pixels at edges in the first round, then those that moved in the last round.
-// twin: src/depth/refine/align.rs
+// twin: src/depth/refine/align.rs, src/depth/refine/band.rs
 
 @group(0) @binding(1) var<storage, read> measures: array<f32>;
 @group(0) @binding(2) var<storage, read> inverse: array<f32>;

@@ -16,20 +16,19 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
+use super::band::{DilateColumns, DilateRows};
 use super::planes::{Planes, SetColors, SetDepths};
 use super::tiles::{self, Tiles};
 use super::votes::{self, RADIUS_LANES, Votes, Weights, depth_step_at};
 use crate::compute::bands::{self, Bands};
 use crate::compute::thread_pool::ThreadPool;
 
-/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels.
-pub const BAND_PX: usize = 4;
 /// Weight of a depth within the band, and of one that was filled in.
 pub const UNCERTAIN: f32 = 0.12;
 pub const FILLED: f32 = 0.02;
 /// Minimum fraction of a depth step between neighbours at an edge, which may be spread over some pixels.
 pub const EDGE_FRACTION: f32 = 0.25;
-/// Number of rounds; each can move an edge by up to [`BAND_PX`].
+/// Number of rounds; each can move an edge by up to [`BAND_PX`](super::band::BAND_PX).
 pub const ROUNDS: usize = 2;
 /// Minimum number of pixels per thread.
 const MIN_PIXELS_PER_THREAD: usize = 64;
@@ -38,7 +37,7 @@ const MIN_PIXELS_PER_THREAD: usize = 64;
 #[derive(Debug)]
 pub struct Aligner {
     planes: Planes,
-    /// Both sides of every discontinuity, and all pixels within [`BAND_PX`] of one.
+    /// Both sides of every discontinuity, and all pixels within [`BAND_PX`](super::band::BAND_PX) of one.
     edge: Vec<bool>,
     band: Vec<bool>,
     scratch: Vec<bool>,
@@ -256,78 +255,6 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
                 }
             }
         }
-    }
-}
-
-/// Width of the band beside an edge pixel, which is itself the first pixel of it.
-const SIDE_PX: usize = BAND_PX - 1;
-
-/// Marks the pixels within [`BAND_PX`] of an edge along the rows of a band.
-struct DilateRows<'a> {
-    tiles: &'a Tiles,
-    width: usize,
-    edge: &'a [bool],
-    rows: Range<usize>,
-    out: &'a mut [bool],
-}
-
-impl WithSimd for DilateRows<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { tiles, width, edge, rows, out } = self;
-        for (line, y) in rows.enumerate() {
-            for columns in tiles.near_columns(y) {
-                let row = &edge[y * width..][..width];
-                let out = &mut out[line * width..][..width];
-                out[columns.clone()].copy_from_slice(&row[columns.clone()]);
-                for px in 1..=SIDE_PX {
-                    let Range { start, end } = columns;
-                    // Pixels without a neighbour this far to the left or right are skipped.
-                    let (after, before) = (start.max(px), end.min(width.saturating_sub(px)));
-                    if after < end {
-                        or_assign(&mut out[after..end], &row[after - px..end - px]);
-                    }
-                    if start < before {
-                        or_assign(&mut out[start..before], &row[start + px..before + px]);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Dilates the mask `along` down the columns.
-struct DilateColumns<'a> {
-    tiles: &'a Tiles,
-    width: usize,
-    along: &'a [bool],
-    rows: Range<usize>,
-    out: &'a mut [bool],
-}
-
-impl WithSimd for DilateColumns<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { tiles, width, along, rows, out } = self;
-        let height = along.len() / width;
-        for (line, y) in rows.enumerate() {
-            for columns in tiles.near_columns(y) {
-                let out = &mut out[line * width..][columns.clone()];
-                out.fill(false);
-                for other in y.saturating_sub(SIDE_PX)..(y + BAND_PX).min(height) {
-                    or_assign(out, &along[other * width..][columns.clone()]);
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn or_assign(to: &mut [bool], from: &[bool]) {
-    for (to, &from) in to.iter_mut().zip(from) {
-        *to |= from;
     }
 }
 

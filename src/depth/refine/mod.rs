@@ -7,6 +7,7 @@
 //! *Accuracy and resolution of Kinect depth data*, 2012).
 
 mod align;
+mod band;
 mod exactness;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]

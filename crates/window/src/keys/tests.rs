@@ -1,7 +1,10 @@
 use std::collections::HashSet;
 
+use bokehcam::depth::focus::FocusRule;
+
 use super::*;
 use crate::state::sample::{running, state};
+use crate::state::{Source, ViewMode, tweak};
 
 const CONTEXT: Context = Context { size: (1280, 720), fit: 1.0, chord: 0 };
 

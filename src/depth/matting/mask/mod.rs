@@ -7,6 +7,7 @@
 mod backdrop;
 mod cells;
 mod posterior;
+mod sides;
 
 use std::ops::Range;
 
@@ -21,6 +22,7 @@ use super::clusters::Color;
 use super::contrast::{Contrast, Discriminant, color_difference};
 use cells::{Cell, Kernel, MaskView, RADIUS, Sums};
 use posterior::Posterior;
+use sides::Sides;
 
 /// Side of a cell in mask pixels, and its minimum in picture pixels.
 const CELL_OF_MASK: f32 = 1.6;
@@ -339,25 +341,4 @@ impl MaskView<'_> {
             MixedPixel { at, near_m, far_m, alpha: 1.0, behind: 1.0, difference }
         }));
     }
-}
-
-/// Parameters left and right of some pixels.
-struct Sides<const N: usize>([[f32; N]; 2]);
-
-impl<const N: usize> Sides<N> {
-    /// Interpolates vertically, from the four corners to both sides.
-    #[inline(always)]
-    fn new([left, below_left, right, below_right]: [[f32; N]; 4], down: f32) -> Self {
-        Self([lerp(&left, &below_left, down), lerp(&right, &below_right, down)])
-    }
-
-    #[inline(always)]
-    fn interpolate(&self, along: f32) -> [f32; N] {
-        lerp(&self.0[0], &self.0[1], along)
-    }
-}
-
-#[inline(always)]
-fn lerp<const N: usize>(a: &[f32; N], b: &[f32; N], fraction: f32) -> [f32; N] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * fraction)
 }

@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::align::{BAND_PX, EDGE_FRACTION, FILLED, ROUNDS, UNCERTAIN};
+use super::super::align::{EDGE_FRACTION, FILLED, ROUNDS, UNCERTAIN};
+use super::super::band::BAND_PX;
 use super::super::noise::{self, LAG_PX, NO_NOISE, SMOOTH_FRACTION, SMOOTH_QUANTILE};
 use super::super::planes::LANES;
 use super::super::smooth::{self, PAIRS_PX};
