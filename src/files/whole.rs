@@ -262,7 +262,7 @@ fn split_path(path: &Path) -> io::Result<(&Path, &OsStr)> {
         io::Error::new(
             ErrorKind::InvalidInput,
             "this is not the name of a \
-                                                                                       file",
+             file",
         )
     })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -104,7 +104,7 @@ pub enum SinkError {
     NoFfmpeg { path: PathBuf },
     /// The ffmpeg program failed.
     #[error("ffmpeg could not write {} ({status}): {}", path.display(), if stderr.is_empty() { "it gave no \
-                                                                                              reason" } else { stderr })]
+        reason" } else { stderr })]
     Ffmpeg {
         path: PathBuf,
         status: String,

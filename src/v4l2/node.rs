@@ -70,7 +70,7 @@ pub struct Usb {
 pub enum NodeError {
     /// No device has this name.
     #[error("there is no camera '{name}'{}", join_or(.available, ": there is ", "; no camera is connected (`bokehcam \
-                                                                                 doctor` says more)"))]
+        doctor` says more)"))]
     NotFound { name: String, available: Vec<String> },
     /// Several devices have this name.
     #[error("'{name}' matches {}; use the path of one", join_or(.candidates, "", "several"))]

@@ -117,7 +117,7 @@ mod tests {
         assert!(began.elapsed() >= Duration::from_millis(20));
         let watch = demand.watch();
         demand.wait(Duration::ZERO);
-        // The event is silent by now.
+        // The event is not set any more.
         demand.wait(Duration::from_secs(3600));
         drop(watch);
     }

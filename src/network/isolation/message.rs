@@ -44,7 +44,7 @@ pub fn send(to: &mut impl Write, message: &impl Serialize) -> io::Result<()> {
         io::Error::new(
             ErrorKind::InvalidData,
             "it has too many inputs, outputs or \
-                                                                              sizes",
+             sizes",
         )
     })?;
     to.write_all(&length.to_le_bytes())?;

@@ -78,7 +78,7 @@ fn handle_requests(mut stream: UnixStream) -> io::Result<()> {
                         &mut stream,
                         &Reply::NotLoaded(LoadFailure::Refused(
                             "it has too many inputs or \
-                                                                          outputs"
+                             outputs"
                                 .to_owned(),
                         )),
                     )?;

@@ -176,7 +176,7 @@ fn negotiate_mode(
     Err(refusal.unwrap_or_else(|| OpenError::NotACamera {
         path: path.to_owned(),
         what: "it accepts none of the formats that \
-                                                                                 it offers",
+            it offers",
     }))
 }
 
@@ -270,7 +270,7 @@ mod tests {
             said("uvcvideo", sys::V4L2_CAP_META_CAPTURE),
             Some(
                 "it gives metadata about the pictures of another \
-                                                                       node"
+                 node"
             )
         );
         assert_eq!(said("vivid", sys::V4L2_CAP_VBI_CAPTURE | streams), Some("it captures no pictures"));

@@ -266,7 +266,7 @@ fn commands_take_plates_and_use_them() {
         (
             "copy.png",
             "nothing in the picture \
-                                                                                           differs from the plate",
+             differs from the plate",
         ),
     ] {
         std::fs::copy(at("me.png"), at("copy.png")).unwrap();

@@ -71,7 +71,7 @@ pub fn check_pipewire(system: &System) -> PipeWireResults {
                 TOPIC,
                 format!(
                     "{name} lists PipeWire cameras only after a change of its \
-                                                              settings"
+                     settings"
                 ),
                 *switch,
             )

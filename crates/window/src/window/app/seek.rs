@@ -1,4 +1,4 @@
-//! SeekState in a recording.
+//! Seeking in a recording.
 
 use std::sync::Arc;
 

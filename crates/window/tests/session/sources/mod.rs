@@ -76,8 +76,10 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     still::write_depth(&folder.path().join("holiday-depth.png"), &depth, 1000.0, false).unwrap();
     let name = photo.display().to_string();
     let mut watched = Watched::begin(&name, folder.path());
-    watched.until("what it is", |told| matches!(told, Update::Note(line) if line.contains("a photo, a single still \
-                                                                                           frame") && line.contains("depth beside it")));
+    watched.until("what it is", |told| {
+        matches!(told, Update::Note(line) if line.contains("a photo, a single still \
+        frame") && line.contains("depth beside it"))
+    });
     let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
     assert!(running.size == (40, 30) && running.has_depth);
     let first = watched.frame("a frame", |_| true);
