@@ -203,7 +203,7 @@ fn mixed_pixels_agree() {
     for at in of_others {
         if let Err(place) = map.matte.pixels.binary_search_by_key(&at, |pixel| pixel.at) {
             let known =
-                MixedPixel { at, near_m: 1.0, far_m: 3.0, alpha: 1.0, behind: 1.0, difference: [0.1, -0.05, 0.02] };
+                MixedPixel { at, near_m: 1.0, far_m: 3.0, alpha: 1.0, background_alpha: 1.0, difference: [0.1, -0.05, 0.02] };
             map.matte.pixels.insert(place, known);
         }
     }
