@@ -6,7 +6,7 @@ struct MixedPixel {
     near: u32,          // uploaded: metres of the nearer and the farther surface; after unpack: the nearer
     far: u32,           // surface as a scene pixel (the farther one is in the scene)
     alpha: f32,         // alpha of the nearer surface
-    behind: f32,        // known fraction of the farther surface
+    background_alpha: f32, // known fraction of the farther surface
     red: f32,           // colour of the nearer surface minus that of the farther one
     green: f32,
     blue: f32,

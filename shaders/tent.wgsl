@@ -40,7 +40,7 @@ fn weigh_pixel(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
     // If the nearer surface is in front of the layer, the farther one is behind it.
     let before = linear_step(work.visible_weight, near.w);
     let alpha = mixed[place].alpha * before;
-    let known = 1.0 - (1.0 - mixed[place].behind) * before;
+    let known = 1.0 - (1.0 - mixed[place].background_alpha) * before;
     let front = weigh_surface(k, near, 1.0);
     // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
     let behind = known - (known + alpha - 1.0) * min(front.value.a / HIDING_WEIGHT, 1.0);

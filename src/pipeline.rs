@@ -41,12 +41,12 @@ use crate::clock::{self, Clock};
 use crate::engine::{Blur, Engine};
 use crate::link::{self, Receiver, Sender};
 use crate::sink::{self, Ending};
-use crate::stats::{About, Report, Tally, Timings};
+use crate::stats::{FrameCounter, Report, RunInfo, Timings};
 
 /// State shared by all stages of a run.
 struct Shared {
     clock: Clock,
-    tally: Tally,
+    tally: FrameCounter,
     pools: Pools,
     /// Description of the camera.
     info: SourceInfo,
@@ -75,7 +75,7 @@ impl Shared {
         let is_viewed = run.view.is_some();
         Self {
             clock: run.clock.clone(),
-            tally: Tally::new(),
+            tally: FrameCounter::new(),
             pools: Pools::new(&BufferCounts { in_blur, is_viewed }, info.size, info.frame_data),
             realtime_period_ns: run.realtime_period_ns(),
             info,
@@ -103,7 +103,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let Timings { decode, depth: of_depth, blur: of_blur, sink: of_sink } = &mut timings;
     let (mut sink, pace, stop) = (run.sink, run.pace, run.stop);
     let about =
-        About { source: info.name.clone(), sink: sink.describe(), budget_ns: run.budget_ns, ..About::default() };
+        RunInfo { source: info.name.clone(), sink: sink.describe(), budget_ns: run.budget_ns, ..RunInfo::default() };
 
     let capture = capture::Stage::new(run.camera, run.demand, stop, &shared, decode);
     let depth = depth::Stage::new(preprocessor, run.depth, (run.changes, run.adaptive), &shared, of_depth);
@@ -122,19 +122,20 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     });
 
     // A source with a known number of frames was stopped before its end.
-    let is_cut = stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
+    let is_cut =
+        stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frame_counts().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Truncated } else { Ending::Complete };
     let (outputs, nodes) = (sink.output_counters(), sink.node_counters());
     let finished = run_guarded("sink", has_ended, move || Ok(sink.finish(ending)?));
     // Only now have the outputs written all frames.
-    let about = About {
+    let about = RunInfo {
         outputs: sink::read_counters(&outputs),
         pipewire: sink::read_counters(&nodes),
         elapsed_ns: shared.clock.now_ns() - began_ns,
         cpu_ns: clock::process_cpu_ns() - cpu_ns,
         ..about
     };
-    let report = Report::new(tally.frames(), &timings, about);
+    let report = Report::new(tally.frame_counts(), &timings, about);
     // The earlier fault is the cause.
     match ended.and(finished) {
         Ok(()) => Ok(report),

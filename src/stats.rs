@@ -2,19 +2,19 @@
 //!
 //! Memory is bounded for a run of any length, and counting a frame does not allocate.
 
+mod frame_counter;
+mod frame_rate;
 mod histogram;
-mod node_use;
-mod pulse;
+mod output_counts;
+mod quality_counts;
 mod report;
-mod rungs;
-mod tally;
 
+pub use frame_counter::{DropCause, DropCounts, FrameCounter, FrameCounts, FrameTicket};
+pub use frame_rate::FrameRateMeter;
 pub use histogram::{Histogram, PassHistograms};
-pub use node_use::{NodeUse, OutputUse};
-pub use pulse::FrameRateMeter;
-pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions, WindowUse};
-pub use rungs::QualityCounts;
-pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
+pub use output_counts::{NodeCounts, OutputCounts};
+pub use quality_counts::QualityCounts;
+pub use report::{Percentiles, QualityStats, Report, RunInfo, StageMs, StagesMs, Versions, WindowStats};
 
 /// Measurements of the stages during a run; each stage fills its own part.
 #[derive(Clone, Debug, Default)]

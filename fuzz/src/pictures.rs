@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::recording::still::{self, Map};
-use bokehcam::recording::{Extras, snapshot as snapshots};
+use bokehcam::recording::{PhotoMetadata, snapshot as snapshots};
 
 use super::input::{assert_one_line, file_path, write_file};
 
@@ -15,11 +15,11 @@ const MAX_WRITTEN_BYTES: usize = 1 << 16;
 pub fn picture(data: &[u8]) {
     let path = write_file("picture.png", data);
     match still::read_photo(&path) {
-        Ok((image, extras)) => {
+        Ok((image, metadata)) => {
             assert!(image.width > 0 && image.height > 0);
             assert_eq!(image.rgb.len(), image.width as usize * image.height as usize * 3);
             if image.rgb.len() < MAX_WRITTEN_BYTES {
-                check_roundtrip(&image, extras);
+                check_roundtrip(&image, metadata);
             }
         }
         Err(error) => assert_one_line(error),
@@ -32,7 +32,7 @@ pub fn picture(data: &[u8]) {
         }
         Err(error) => assert_one_line(error),
     }
-    if let Err(error) = snapshots::settings(&path) {
+    if let Err(error) = snapshots::read_settings(&path) {
         assert_one_line(error);
     }
 }
@@ -63,14 +63,14 @@ fn check_maps(path: &Path) {
 }
 
 /// Checks that a picture and its metadata survive writing and reading.
-fn check_roundtrip(image: &ColorImage, extras: Extras) {
-    let extras = extras.without_thumbnail();
-    for (name, extras) in [("again.png", extras.clone()), ("again.jpg", extras.for_jpeg())] {
+fn check_roundtrip(image: &ColorImage, metadata: PhotoMetadata) {
+    let metadata = metadata.without_thumbnail();
+    for (name, metadata) in [("again.png", metadata.clone()), ("again.jpg", metadata.for_jpeg())] {
         let path = file_path(name);
-        still::write_photo(&path, image, &extras, true).expect("a picture that was read can be written");
+        still::write_photo(&path, image, &metadata, true).expect("a picture that was read can be written");
         let (again, with) = still::read_photo(&path).expect("a picture that was written can be read");
         assert_eq!((again.width, again.height), (image.width, image.height), "{name}");
-        assert_eq!((with.icc_profile, with.exif), (extras.icc_profile, extras.exif), "{name}");
+        assert_eq!((with.icc_profile, with.exif), (metadata.icc_profile, metadata.exif), "{name}");
         assert!(name != "again.png" || again.rgb == image.rgb);
     }
 }
@@ -79,7 +79,7 @@ fn check_roundtrip(image: &ColorImage, extras: Extras) {
 pub fn snapshot(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let path = write_file("snapshot.png", &png_with_text(text));
-    match snapshots::settings(&path) {
+    match snapshots::read_settings(&path) {
         Ok(settings) => {
             assert!(settings.iter().all(|(_, value)| !value.contains('\n')), "{settings:?}");
             let flags = settings.into_iter().map(|(name, value)| format!("--{name}={value}"));

@@ -51,11 +51,11 @@ impl Recording {
     }
 
     fn has_right(&self) -> bool {
-        self.0.pair().is_some()
+        self.0.stereo_geometry().is_some()
     }
 
     fn disparities(&self) -> Option<u32> {
-        self.0.disparities()
+        self.0.disparity_count()
     }
 
     /// Returns the time of a frame; panics if the index is out of range.
@@ -71,7 +71,7 @@ impl Recording {
             if self.0.has_depth() {
                 self.0.read_depth(index, &mut scratch, &mut depth)?;
             }
-            if self.0.pair().is_some() {
+            if self.0.stereo_geometry().is_some() {
                 self.0.read_right(index, &mut scratch, &mut right)?;
             }
             Ok((color, depth, right))
@@ -80,7 +80,7 @@ impl Recording {
         let (width, height) = color.size();
         let rgb = PyArray1::from_vec(py, color.rgb).reshape([height as usize, width as usize, 3])?;
         let depth = self.0.has_depth().then(|| plane(py, depth.metres, depth.width)).transpose()?;
-        let right = self.0.pair().map(|_| plane(py, right.luma, right.width)).transpose()?;
+        let right = self.0.stereo_geometry().map(|_| plane(py, right.luma, right.width)).transpose()?;
         Ok((rgb, depth, right))
     }
 }

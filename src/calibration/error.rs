@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 #[cfg(feature = "files")]
-use crate::files::input::said;
+use crate::files::input::format_io_error;
 
 /// Error of reading or using a calibration.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -14,7 +14,7 @@ use crate::files::input::said;
 pub enum CalibrationError {
     /// The file cannot be read.
     #[cfg(feature = "files")]
-    #[error("cannot read the calibration {}: {}", path.display(), said(source))]
+    #[error("cannot read the calibration {}: {}", path.display(), format_io_error(source))]
     Io { path: PathBuf, source: io::Error },
     /// The format of the file is unknown.
     #[error(

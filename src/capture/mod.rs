@@ -21,7 +21,7 @@ pub use error::CaptureError;
 pub use seek::{SeekRequest, Seeker};
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
-use crate::stats::Cause;
+use crate::stats::DropCause;
 
 /// A source of frames.
 pub trait Camera: Send {
@@ -114,7 +114,7 @@ pub enum Captured {
     /// A frame.
     Frame(Stamp),
     /// Number of frames lost before they could be read. Not the end: the next call continues.
-    Lost(u64, Cause),
+    Lost(u64, DropCause),
     /// No frame yet; the camera may be absent for a while. The caller checks whether to stop, and calls again.
     Waiting,
     /// A frame that cannot be decoded.

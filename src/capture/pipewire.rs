@@ -6,13 +6,13 @@ use super::pixels::Decoder;
 use super::v4l2::MediaTime;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use crate::clock::Clock;
-use crate::frame::fit::Fit;
+use crate::frame::fit::Letterbox;
 use crate::frame::{ColorImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Received, Receiver, Sender};
 use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
 use crate::pipewire::reader::{Frame, PictureHandler, Reader};
-use crate::stats::Cause;
+use crate::stats::DropCause;
 use crate::v4l2::live::ModeRequest;
 use crate::v4l2::live::negotiate::{self, LinkSpeed};
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
@@ -62,7 +62,7 @@ impl PipeWireCamera {
             negotiated: None,
             size: None,
             scratch: ColorImage::default(),
-            fit: Fit::default(),
+            fit: Letterbox::default(),
             losses: Losses::default(),
             warned: false,
         };
@@ -129,7 +129,7 @@ impl Camera for PipeWireCamera {
 
 /// Removes the next cause of loss to report, and returns it with its count.
 fn next_loss(Losses { missed, stale, corrupt }: &mut Losses) -> Option<Captured> {
-    let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
+    let causes = [(missed, DropCause::Driver), (stale, DropCause::Evicted), (corrupt, DropCause::Corrupt)];
     let (count, cause) = causes.into_iter().find(|(count, _)| **count > 0)?;
     Some(Captured::Lost(mem::take(count), cause))
 }
@@ -145,7 +145,7 @@ struct PictureDecoder {
     size: Option<(u32, u32)>,
     /// Buffer for decoding pictures of another size.
     scratch: ColorImage,
-    fit: Fit,
+    fit: Letterbox,
     /// Frames lost since the last picture was sent.
     losses: Losses,
     /// Whether a warning about undecodable pictures was logged.
@@ -289,7 +289,7 @@ mod tests {
                 negotiated: None,
                 size: None,
                 scratch: ColorImage::default(),
-                fit: Fit::default(),
+                fit: Letterbox::default(),
                 losses: Losses::default(),
                 warned: false,
             };

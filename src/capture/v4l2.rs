@@ -6,9 +6,9 @@ use super::pixels::Decoder;
 use super::stereo_pair::PairedCamera;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use crate::clock::Clock;
-use crate::frame::fit::Fit;
+use crate::frame::fit::Letterbox;
 use crate::frame::{ColorImage, Stamp};
-use crate::stats::Cause;
+use crate::stats::DropCause;
 use crate::v4l2::live::{LiveDevice, ModeRequest, Next, Setting};
 use crate::v4l2::queue::Losses;
 
@@ -22,7 +22,7 @@ pub struct V4l2Camera {
     info: SourceInfo,
     /// Buffer for decoding pictures of another size.
     scratch: ColorImage,
-    fit: Fit,
+    fit: Letterbox,
     times: MediaTime,
     /// Number of frames delivered.
     delivered: u64,
@@ -65,7 +65,7 @@ impl V4l2Camera {
             decoder,
             info,
             scratch: ColorImage::default(),
-            fit: Fit::default(),
+            fit: Letterbox::default(),
             times: MediaTime::default(),
             delivered: 0,
             losses: Losses::default(),
@@ -96,7 +96,7 @@ impl V4l2Camera {
         let is_decoded = self.decode(color);
         self.live.release_frame();
         if !is_decoded {
-            return Captured::Lost(1, Cause::Corrupt);
+            return Captured::Lost(1, DropCause::Corrupt);
         }
         let index = self.delivered as usize;
         self.delivered += 1;
@@ -142,7 +142,7 @@ impl V4l2Camera {
     /// Removes the next cause of loss to report, and returns it with its count.
     fn next_loss(&mut self) -> Option<Captured> {
         let Losses { missed, stale, corrupt } = &mut self.losses;
-        let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
+        let causes = [(missed, DropCause::Driver), (stale, DropCause::Evicted), (corrupt, DropCause::Corrupt)];
         let (count, cause) = causes.into_iter().find(|(count, _)| **count > 0)?;
         Some(Captured::Lost(std::mem::take(count), cause))
     }

@@ -13,7 +13,7 @@ use rustix::io::Errno;
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
-use crate::files::trusted::absolute;
+use crate::files::trusted::absolute_env_path;
 
 /// Time limit for the folder's lock, which runs hold briefly while they start.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(1);
@@ -27,7 +27,7 @@ const SOCKET_EXTENSION: &str = ".sock";
 /// The user has no runtime folder, or the folder is not private to the user.
 pub(super) fn socket_folder() -> Result<PathBuf, ControlError> {
     let refuse = |what: String| ControlError::NoFolder(what);
-    let runtime = absolute("XDG_RUNTIME_DIR")
+    let runtime = absolute_env_path("XDG_RUNTIME_DIR")
         .ok_or_else(|| refuse("there is no runtime folder: XDG_RUNTIME_DIR is not an absolute path".into()))?;
     if !runtime.is_dir() {
         return Err(refuse(format!(

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::color::{encode_srgb, srgb_to_linear_table};
-use crate::frame::scale::Scale;
+use crate::frame::scale::RowScaler;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
 
@@ -61,7 +61,7 @@ pub struct VirtualBackground {
     srgb_table: Box<[u8; TABLE_LEN]>,
     /// The virtual background, scaled to the frame.
     scaled: ColorImage,
-    scale: Scale,
+    scale: RowScaler,
     row: Vec<u16>,
     composited: Vec<CompositedPixel>,
 }
@@ -91,7 +91,7 @@ impl VirtualBackground {
             linear: srgb_to_linear_table(),
             srgb_table: Box::new(std::array::from_fn(|step| encode_srgb(linear_of(step)))),
             scaled: ColorImage::default(),
-            scale: Scale::default(),
+            scale: RowScaler::default(),
             row: Vec::new(),
             composited: Vec::new(),
         })
@@ -167,7 +167,7 @@ impl VirtualBackground {
             pixel.difference[p] = near - far;
             *code = self.encode_linear(far + pixel.alpha * (near - far));
         }
-        pixel.behind = 1.0;
+        pixel.background_alpha = 1.0;
         let surfaces = [(pixel.near_m, fractions[0]), (pixel.far_m, fractions[1])];
         let [near_m, far_m] = surfaces.map(|(metres, fraction)| pull_to_focus(metres, fraction, lens));
         let is_in_front = lens.coc_px(near_m) < -SHARP_PX && near_m < far_m;
@@ -220,16 +220,16 @@ fn pull_to_focus(metres: f32, fraction: f32, lens: &DepthCoc) -> f32 {
 }
 
 /// Scales a picture so that it covers `into`, and crops the rest equally on both sides.
-fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut Scale, &mut Vec<u16>)) {
+fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut RowScaler, &mut Vec<u16>)) {
     let [from_width, from_height, width, height] =
         [from.width, from.height, into.width, into.height].map(|side| side as usize);
     let ratio = (width as f64 / from_width as f64).max(height as f64 / from_height as f64);
     let whole = [from_width, from_height].map(|side| (side as f64 * ratio).round() as usize);
     let whole = (whole[0].max(width), whole[1].max(height));
-    scale.adapt((from_width, from_height), whole);
+    scale.set_sizes((from_width, from_height), whole);
     let (left, top) = ((whole.0 - width) / 2, (whole.1 - height) / 2);
     for (y, line) in into.rgb.chunks_exact_mut(3 * width).enumerate() {
-        scale.row(&from.rgb, top + y, left..left + width, row, line);
+        scale.scale_row(&from.rgb, top + y, left..left + width, row, line);
     }
 }
 
@@ -280,8 +280,14 @@ mod tests {
         let (near, far) = (linear[100], linear[200]);
         let own = encode_srgb(0.6 * near + 0.4 * far);
         color.rgb[6..9].fill(own);
-        let pixel =
-            |near_m, far_m| MixedPixel { at: 2, near_m, far_m, alpha: 0.6, behind: 0.4, difference: [near - far; 3] };
+        let pixel = |near_m, far_m| MixedPixel {
+            at: 2,
+            near_m,
+            far_m,
+            alpha: 0.6,
+            background_alpha: 0.4,
+            difference: [near - far; 3],
+        };
         let before = (color.clone(), map.clone());
         map.matte.pixels = vec![pixel(1.0, 3.0)];
         replace(&GREEN, &mut color, &mut map);
@@ -295,7 +301,7 @@ mod tests {
         map.matte.pixels = vec![pixel(0.5, 3.0)];
         replace(&GREEN, &mut color, &mut map);
         let [left] = map.matte.pixels[..] else { panic!("it shows two surfaces") };
-        assert_eq!((left.near_m, left.far_m, left.alpha, left.behind), (0.5, 1.0, 0.6, 1.0));
+        assert_eq!((left.near_m, left.far_m, left.alpha, left.background_alpha), (0.5, 1.0, 0.6, 1.0));
         for (p, code) in [0, 177, 64].into_iter().enumerate() {
             assert!((left.difference[p] - (near - linear[code])).abs() < 0.02);
         }

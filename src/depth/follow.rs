@@ -83,7 +83,7 @@ impl AutoFraming {
         }
         self.time_ns = Some(time_ns);
         let [x, y, zoom] = self.place;
-        Crop { center: [x, y], zoom: zoom.exp() }.inside()
+        Crop { center: [x, y], zoom: zoom.exp() }.clamp_inside()
     }
 
     /// Advances the spring by `passed_s` seconds.
@@ -139,7 +139,7 @@ impl AutoFraming {
         let middle = 0.5 * (top + bottom);
         // Centred on the subject, but with no more than the headroom above it.
         let below_headroom = top + (0.5 - HEADROOM) / zoom;
-        Some(crop_state(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
+        Some(crop_state(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.clamp_inside()))
     }
 }
 
@@ -185,7 +185,7 @@ mod tests {
             assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
             let top = part.center[1] - 0.5 / part.zoom;
             assert!((0.0..0.3).contains(&top), "the head is in it: {part:?}");
-            assert_eq!(part, part.inside());
+            assert_eq!(part, part.clamp_inside());
         }
     }
 

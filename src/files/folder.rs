@@ -1,9 +1,9 @@
 //! Folders whose files belong together, such as the pictures of one run: old files stay until all new ones are
 //! complete.
 //!
-//! The list [`LIST`] in the folder names the files that this program wrote, one per line; other files are never
+//! The list [`LIST_NAME`] in the folder names the files that this program wrote, one per line; other files are never
 //! touched. In an empty folder files are written directly, each atomically. Otherwise they are written to a hidden
-//! subfolder, [`PART`], and renamed once all are complete. The folder is locked while it is open.
+//! subfolder, [`STAGING_NAME`], and renamed once all are complete. The folder is locked while it is open.
 
 mod list;
 mod replace;
@@ -16,14 +16,14 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{FlockOperation, flock, syncfs};
 
 use self::list::List;
-pub use self::list::adopt;
-use self::replace::{keep, make_subfolder, recover, refuse_foreign, replace};
-use super::whole::Part;
+pub use self::list::adopt_files;
+use self::replace::{create_subfolder, keep_incomplete, recover_interrupted, refuse_foreign, replace_files};
+use super::atomic_file::PartFile;
 
 /// The name of the list of our own files.
-pub const LIST: &str = ".bokehcam";
+pub const LIST_NAME: &str = ".bokehcam";
 /// The hidden subfolder for files that will replace others.
-pub const PART: &str = ".bokehcam.part";
+pub const STAGING_NAME: &str = ".bokehcam.part";
 
 /// An error in writing a folder.
 #[derive(Debug, thiserror::Error)]
@@ -50,25 +50,25 @@ pub enum FolderError {
 }
 
 impl FolderError {
-    fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    fn cannot_write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         |cause| Self::Write { path: path.to_owned(), cause }
     }
 }
 
 /// Returns whether we have written files into this folder.
-pub fn is_ours(path: &Path) -> bool {
-    path.join(LIST).symlink_metadata().is_ok_and(|list| list.is_file())
+pub fn has_file_list(path: &Path) -> bool {
+    path.join(LIST_NAME).symlink_metadata().is_ok_and(|list| list.is_file())
 }
 
 /// The files that will be written.
-pub struct Set<'a> {
+pub struct FileSet<'a> {
     /// Subfolders with files of the set.
     pub subfolders: &'a [&'a str],
     /// Whether a file name may belong to the set, such as `000000.png` or `rgb/000000.png`.
-    pub has: &'a dyn Fn(&str) -> bool,
+    pub contains: &'a dyn Fn(&str) -> bool,
 }
 
-/// A folder that is being written. Dropping it has the effect of [`Folder::cut`].
+/// A folder that is being written. Dropping it has the effect of [`Folder::finish_incomplete`].
 #[derive(Debug)]
 pub struct Folder {
     /// The path without a trailing slash.
@@ -78,7 +78,7 @@ pub struct Folder {
     list: List,
     /// Holds the lock while it is open.
     lock: File,
-    ended: bool,
+    is_finished: bool,
 }
 
 impl Folder {
@@ -88,37 +88,38 @@ impl Folder {
     /// # Errors
     /// The folder is not empty and `replace` is not set, or has a file of the set that is not ours; another run writes
     /// it, or it cannot be written.
-    pub fn open(path: &Path, replace: bool, set: &Set) -> Result<Self, FolderError> {
+    pub fn open(path: &Path, replace: bool, set: &FileSet) -> Result<Self, FolderError> {
         let path: PathBuf = path.components().collect();
-        let write = || FolderError::write(&path);
+        let write = || FolderError::cannot_write(&path);
         fs::create_dir_all(&path).map_err(|error| {
             // The system reports `exists` or `not a directory`, but not for which part of the path.
             let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
             let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is not a folder");
             match in_the_way {
-                Some(part) => FolderError::write(part)(no_folder()),
-                None => FolderError::write(&path)(error),
+                Some(part) => FolderError::cannot_write(part)(no_folder()),
+                None => FolderError::cannot_write(&path)(error),
             }
         })?;
         let lock = File::open(&path).map_err(write())?;
         if flock(&lock, FlockOperation::NonBlockingLockExclusive) == Err(rustix::io::Errno::WOULDBLOCK) {
             return Err(FolderError::Busy { path });
         }
-        recover(&path, set)?;
+        recover_interrupted(&path, set)?;
         let mut names = fs::read_dir(&path).map_err(write())?.map(|entry| entry.map(|entry| entry.file_name()));
-        let other = names.find(|name| name.as_ref().map_or(true, |name| name != LIST)).transpose().map_err(write())?;
+        let other =
+            names.find(|name| name.as_ref().map_or(true, |name| name != LIST_NAME)).transpose().map_err(write())?;
         let staging = match other {
             None => None,
             Some(_) if !replace => return Err(FolderError::NotEmpty { path }),
             Some(_) => {
                 refuse_foreign(&path, set)?;
-                let part = path.join(PART);
-                fs::create_dir(&part).map_err(FolderError::write(&part))?;
+                let part = path.join(STAGING_NAME);
+                fs::create_dir(&part).map_err(FolderError::cannot_write(&part))?;
                 Some(part)
             }
         };
         let list = List::create(staging.as_ref().unwrap_or(&path))?;
-        Ok(Self { path, staging, list, lock, ended: false })
+        Ok(Self { path, staging, list, lock, is_finished: false })
     }
 
     /// Returns the path of the folder.
@@ -127,33 +128,33 @@ impl Folder {
     }
 
     /// Returns the number of files written so far.
-    pub fn files(&self) -> u64 {
+    pub fn file_count(&self) -> u64 {
         self.list.len()
     }
 
     /// Returns whether old files are replaced once the new ones are complete.
-    pub fn replaces(&self) -> bool {
+    pub fn is_replacing(&self) -> bool {
         self.staging.is_some()
     }
 
-    /// Starts a file with this name, and creates its subfolder if needed. [`Folder::put`] completes it.
+    /// Starts a file with this name, and creates its subfolder if needed. [`Folder::commit_file`] completes it.
     ///
     /// # Errors
     /// The folder is gone, or cannot be written.
-    pub fn begin(&self, name: &str) -> Result<Part, FolderError> {
+    pub fn create_file(&self, name: &str) -> Result<PartFile, FolderError> {
         self.check_exists()?;
         let path = self.target().join(name);
         if let Some((subfolder, _)) = name.rsplit_once('/') {
-            make_subfolder(&self.target().join(subfolder))?;
+            create_subfolder(&self.target().join(subfolder))?;
         }
-        Part::create(&path).map_err(FolderError::write(&path))
+        PartFile::create(&path).map_err(FolderError::cannot_write(&path))
     }
 
     /// Completes a file.
     ///
     /// # Errors
     /// A file with its name has appeared, or it cannot be written; the folder is unchanged.
-    pub fn put(&mut self, part: Part) -> Result<(), FolderError> {
+    pub fn commit_file(&mut self, part: PartFile) -> Result<(), FolderError> {
         let path = part.path().to_owned();
         let name = path.strip_prefix(self.target()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
         part.commit_unsynced().map_err(|cause| match cause.kind() {
@@ -174,14 +175,14 @@ impl Folder {
     pub fn finish(mut self) -> Result<u64, FolderError> {
         self.check_exists()?;
         self.sync()?;
-        self.ended = true;
+        self.is_finished = true;
         let Some(part) = self.staging.take() else {
             self.remove_empty_list();
             return Ok(0);
         };
-        let replaced = replace(&part, &self.path);
+        let replaced = replace_files(&part, &self.path);
         if replaced.is_err() {
-            keep(&part, &self.path)?;
+            keep_incomplete(&part, &self.path)?;
         }
         replaced
     }
@@ -191,19 +192,19 @@ impl Folder {
     ///
     /// # Errors
     /// They cannot be renamed, and stay in a hidden subfolder.
-    pub fn cut(mut self) -> Result<Option<PathBuf>, FolderError> {
+    pub fn finish_incomplete(mut self) -> Result<Option<PathBuf>, FolderError> {
         self.end_incomplete()
     }
 
-    /// Does the work of [`Folder::cut`] and [`Drop`].
+    /// Does the work of [`Folder::finish_incomplete`] and [`Drop`].
     fn end_incomplete(&mut self) -> Result<Option<PathBuf>, FolderError> {
-        self.ended = true;
+        self.is_finished = true;
         self.check_exists()?;
         // Files that cannot be synced are kept as well.
         let _ = self.sync();
         match self.staging.take() {
-            Some(part) if self.list.len() > 0 => keep(&part, &self.path).map(Some),
-            Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::write(&part)),
+            Some(part) if self.list.len() > 0 => keep_incomplete(&part, &self.path).map(Some),
+            Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::cannot_write(&part)),
             None => {
                 self.remove_empty_list();
                 Ok(None)
@@ -213,15 +214,15 @@ impl Folder {
 
     /// Syncs all files at once: a sync after each would take longer than a camera can wait.
     fn sync(&self) -> Result<(), FolderError> {
-        syncfs(&self.lock).map_err(|error| FolderError::write(&self.path)(error.into()))
+        syncfs(&self.lock).map_err(|error| FolderError::cannot_write(&self.path)(error.into()))
     }
 
     fn check_exists(&self) -> Result<(), FolderError> {
         let identity = |folder: fs::Metadata| (folder.dev(), folder.ino());
-        let opened = self.lock.metadata().map(identity).map_err(FolderError::write(&self.path))?;
+        let opened = self.lock.metadata().map(identity).map_err(FolderError::cannot_write(&self.path))?;
         // A new folder with the same name is not ours.
         match fs::metadata(&self.path).map(identity) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::write(&self.path)(error)),
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::cannot_write(&self.path)(error)),
             Ok(there) if there == opened => Ok(()),
             _ => Err(FolderError::Gone { path: self.path.clone() }),
         }
@@ -234,14 +235,14 @@ impl Folder {
 
     fn remove_empty_list(&self) {
         if self.list.len() == 0 {
-            let _ = fs::remove_file(self.path.join(LIST));
+            let _ = fs::remove_file(self.path.join(LIST_NAME));
         }
     }
 }
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        if !self.ended
+        if !self.is_finished
             && let Err(error) = self.end_incomplete()
         {
             tracing::warn!("{error}");

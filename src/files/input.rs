@@ -20,7 +20,7 @@ pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 pub const NO_FILE: &str = "there is no such file";
 
 /// Returns the system's error message, shortened.
-pub fn said(error: &io::Error) -> String {
+pub fn format_io_error(error: &io::Error) -> String {
     let text = error.to_string();
     match error.kind() {
         io::ErrorKind::NotFound if error.raw_os_error().is_some() => NO_FILE.to_owned(),
@@ -40,41 +40,41 @@ pub fn open(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Reads a regular file of at most `most_bytes` bytes.
+/// Reads a regular file of at most `max_bytes` bytes.
 ///
 /// # Errors
 /// Same as for [`open`], or [`io::ErrorKind::FileTooLarge`] with both sizes, without reading.
-pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let expected_bytes = file.metadata()?.len();
-    check_size(most_bytes, expected_bytes)?;
+    check_size(max_bytes, expected_bytes)?;
     let mut bytes = Vec::with_capacity(expected_bytes as usize);
     // The file may grow meanwhile, or report no size, as files under /proc do.
-    file.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    check_size(most_bytes, bytes.len() as u64)?;
+    file.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    check_size(max_bytes, bytes.len() as u64)?;
     Ok(bytes)
 }
 
-/// Reads a regular file of at most `most_bytes` bytes of UTF-8.
+/// Reads a regular file of at most `max_bytes` bytes of UTF-8.
 ///
 /// # Errors
 /// Same as for [`read`], or [`io::ErrorKind::InvalidData`].
-pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
-    let text = String::from_utf8(read(path, most_bytes)?);
+pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
+    let text = String::from_utf8(read(path, max_bytes)?);
     text.map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
 }
 
-fn check_size(most_bytes: u64, bytes: u64) -> io::Result<()> {
-    if bytes <= most_bytes {
+fn check_size(max_bytes: u64, bytes: u64) -> io::Result<()> {
+    if bytes <= max_bytes {
         return Ok(());
     }
-    let what = format!("it is too large: {bytes} bytes, and at most {most_bytes} are accepted");
+    let what = format!("it is too large: {bytes} bytes, and at most {max_bytes} are accepted");
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
 
 /// Returns the kind of an existing special file or folder at an output path, which must not be replaced; `None` for a
 /// regular file, or none at all.
-pub fn special_file_kind(path: &Path) -> Option<&'static str> {
+pub fn find_special_file_kind(path: &Path) -> Option<&'static str> {
     special_kind(path.metadata().ok()?.file_type())
 }
 

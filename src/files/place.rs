@@ -5,7 +5,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Resolves all links in a path; components that do not exist are appended as they are.
-pub fn resolved(path: &Path) -> PathBuf {
+pub fn resolve_links(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let existing = absolute.ancestors().find_map(|ancestor| Some((ancestor, ancestor.canonicalize().ok()?)));
     let Some((ancestor, there)) = existing else { return absolute };
@@ -17,15 +17,15 @@ pub fn resolved(path: &Path) -> PathBuf {
 
 /// Returns whether one of two paths equals or contains the other, so that writing to one may damage the other. They
 /// need not exist.
-pub fn overlap(one: &Path, other: &Path) -> bool {
-    let [one, other] = [one, other].map(resolved);
+pub fn paths_overlap(one: &Path, other: &Path) -> bool {
+    let [one, other] = [one, other].map(resolve_links);
     // Device and inode also detect a folder that is mounted in two places.
     let identity = |path: &Path| fs::metadata(path).ok().map(|there| (there.dev(), there.ino()));
-    let holds = |outer: &Path, inner: &Path| {
+    let contains = |outer: &Path, inner: &Path| {
         let outer_is = identity(outer);
         inner.starts_with(outer) || inner.ancestors().any(|part| outer_is.is_some() && identity(part) == outer_is)
     };
-    holds(&one, &other) || holds(&other, &one)
+    contains(&one, &other) || contains(&other, &one)
 }
 
 #[cfg(test)]
@@ -45,13 +45,13 @@ mod tests {
         for other in
             ["take", "take/", "./take", "link", "link/rgb", "inner", "inner/new/er", "take/none", "take/up/take"]
         {
-            assert!(overlap(&at("take"), &at(other)), "{other}");
-            assert!(overlap(&at(other), &at("take")), "{other}");
+            assert!(paths_overlap(&at("take"), &at(other)), "{other}");
+            assert!(paths_overlap(&at(other), &at("take")), "{other}");
         }
-        assert!(overlap(&at("take"), dir.path()));
+        assert!(paths_overlap(&at("take"), dir.path()));
         for other in ["taken", "other", "take/up/other", "link/../taken"] {
-            assert!(!overlap(&at("take"), &at(other)), "{other}");
+            assert!(!paths_overlap(&at("take"), &at(other)), "{other}");
         }
-        assert_eq!(resolved(&at("inner/new/er")), at("take/rgb").canonicalize().unwrap().join("new/er"));
+        assert_eq!(resolve_links(&at("inner/new/er")), at("take/rgb").canonicalize().unwrap().join("new/er"));
     }
 }

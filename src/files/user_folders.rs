@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 
 use super::input;
-use super::trusted::absolute;
+use super::trusted::absolute_env_path;
 
 /// The default folders of snapshots and recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,29 +16,29 @@ pub struct Folders {
 }
 
 /// The prefix of all names, and the suffixes of pictures and recordings.
-const NAME: &str = "bokehcam";
-const PICTURE: &str = ".png";
-const VIDEO: &str = ".mp4";
+const PREFIX: &str = "bokehcam";
+const PICTURE_SUFFIX: &str = ".png";
+const VIDEO_SUFFIX: &str = ".mp4";
 /// Date and time between them.
-const TIME: &str = "%Y-%m-%d %H-%M-%S";
+const TIME_FORMAT: &str = "%Y-%m-%d %H-%M-%S";
 
 impl Folders {
     /// Creates folders that are all the same.
-    pub fn at(folder: PathBuf) -> Self {
+    pub fn single(folder: PathBuf) -> Self {
         Self { pictures: folder.clone(), videos: folder }
     }
 
     /// Returns the user's folders of pictures and videos, from the environment, `user-dirs.dirs` or their default
     /// names; the current folder if none exists.
-    pub fn of_user() -> Self {
-        let home = absolute("HOME");
-        let config = absolute("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
+    pub fn from_user_dirs() -> Self {
+        let home = absolute_env_path("HOME");
+        let config = absolute_env_path("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
         let named =
             config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MAX_SETTINGS_BYTES).ok());
         let folder = |variable: &str, usual: &str| {
             let home = home.as_deref();
             let named = named.as_deref().zip(home).and_then(|(text, home)| parse_user_dir(text, variable, home));
-            let all = [absolute(variable), named, home.map(|home| home.join(usual))];
+            let all = [absolute_env_path(variable), named, home.map(|home| home.join(usual))];
             all.into_iter()
                 .flatten()
                 .find(|folder| folder.is_dir())
@@ -54,68 +54,68 @@ impl Folders {
         [self.videos.as_path()].into_iter().chain(pictures)
     }
 
-    /// Returns a path for a new recording, which neither exists nor is `taken`.
-    pub fn free_video(&self, taken: impl Fn(&Path) -> bool) -> PathBuf {
-        unused_path(&self.videos, VIDEO, taken)
+    /// Returns a path for a new recording, which neither exists nor taken by `is_taken`.
+    pub fn unused_video_path(&self, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
+        unused_path(&self.videos, VIDEO_SUFFIX, is_taken)
     }
 
     /// Returns a path for a new picture, which does not exist.
-    pub fn free_picture(&self) -> PathBuf {
-        unused_path(&self.pictures, PICTURE, |_| false)
+    pub fn unused_picture_path(&self) -> PathBuf {
+        unused_path(&self.pictures, PICTURE_SUFFIX, |_| false)
     }
 }
 
-/// Returns a path in the folder, named by date, with this suffix; neither a file, nor a link, nor `taken`.
-fn unused_path(folder: &Path, ending: &str, taken: impl Fn(&Path) -> bool) -> PathBuf {
-    let stem = stem();
+/// Returns a path in the folder, named by date, with this suffix; neither a file, nor a link, nor taken by `is_taken`.
+fn unused_path(folder: &Path, suffix: &str, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
+    let stem = timestamped_stem();
     let path = |number: u32| match number {
-        1 => folder.join(format!("{stem}{ending}")),
-        _ => folder.join(format!("{stem}-{number}{ending}")),
+        1 => folder.join(format!("{stem}{suffix}")),
+        _ => folder.join(format!("{stem}-{number}{suffix}")),
     };
-    let is_free = |path: &PathBuf| path.symlink_metadata().is_err() && !taken(path);
+    let is_free = |path: &PathBuf| path.symlink_metadata().is_err() && !is_taken(path);
     (1..u32::MAX).map(path).find(is_free).unwrap_or_else(|| path(u32::MAX))
 }
 
 /// Returns the file name of a new file without extension: the local date and time.
-pub fn stem() -> String {
-    jiff::ZonedDateTime::now().strftime(&format!("{NAME} {TIME}")).to_string()
+pub fn timestamped_stem() -> String {
+    jiff::ZonedDateTime::now().strftime(&format!("{PREFIX} {TIME_FORMAT}")).to_string()
 }
 
 /// Returns whether this is a default name of a recording, in the current form or that of earlier versions,
 /// `bokehcam-7.mp4`.
-pub fn is_video(name: &str) -> bool {
-    let Some(rest) = name.strip_prefix(NAME).and_then(|rest| rest.strip_suffix(VIDEO)) else { return false };
+pub fn is_recording_name(name: &str) -> bool {
+    let Some(rest) = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(VIDEO_SUFFIX)) else { return false };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     if let Some(number) = rest.strip_prefix('-') {
         return is_number(number);
     }
     let Some((date, number)) = rest.split_at_checked(" 0000-00-00 00-00-00".len()) else { return false };
-    let is_date = jiff::civil::DateTime::strptime(format!(" {TIME}"), date).is_ok();
+    let is_date = jiff::civil::DateTime::strptime(format!(" {TIME_FORMAT}"), date).is_ok();
     is_date && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
 }
 
 /// Formats a path for users: relative to the home folder (`~/`) if it lies there.
-pub fn shown(path: &Path) -> String {
-    match absolute("HOME").and_then(|home| path.strip_prefix(home).ok().map(Path::to_owned)) {
+pub fn format_path(path: &Path) -> String {
+    match absolute_env_path("HOME").and_then(|home| path.strip_prefix(home).ok().map(Path::to_owned)) {
         Some(inside) => format!("~/{}", inside.display()),
         None => path.display().to_string(),
     }
 }
 
-/// Formats an output for users: a virtual camera by its name, a file as [`shown`].
-pub fn shown_output(name: &str) -> String {
-    if name.starts_with('/') { shown(Path::new(name)) } else { name.to_owned() }
+/// Formats an output for users: a virtual camera by its name, a file as [`format_path`].
+pub fn format_output(name: &str) -> String {
+    if name.starts_with('/') { format_path(Path::new(name)) } else { name.to_owned() }
 }
 
 /// Returns the absolute path of the folder of a file; `None` if the file does not exist.
-pub fn folder_of(file: &Path) -> Option<PathBuf> {
+pub fn parent_folder(file: &Path) -> Option<PathBuf> {
     let folder = file.canonicalize().ok().filter(|file| file.is_file())?;
     folder.parent().map(Path::to_owned)
 }
 
-/// Opens a folder in the desktop's file manager without waiting; calls `failed` with the reason, on another thread, if
+/// Opens a folder in the desktop's file manager without waiting; calls `on_error` with the reason, on another thread, if
 /// that fails.
-pub fn open(folder: PathBuf, failed: impl Fn(String) + Send + 'static) {
+pub fn open_in_file_manager(folder: PathBuf, on_error: impl Fn(String) + Send + 'static) {
     let run = move || {
         let mut command = Command::new("xdg-open");
         command.arg(&folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -124,7 +124,7 @@ pub fn open(folder: PathBuf, failed: impl Fn(String) + Send + 'static) {
             Ok(status) => format!("xdg-open: {status}"),
             Err(error) => format!("xdg-open: {error}"),
         };
-        failed(format!("{} cannot be shown: {why}", folder.display()));
+        on_error(format!("{} cannot be shown: {why}", folder.display()));
     };
     // If there is no thread, the failure cannot be reported.
     let _ = thread::Builder::new().name("folder".into()).spawn(run);
@@ -167,9 +167,9 @@ mod tests {
 
     #[test]
     fn names_have_the_date_and_are_known_again() {
-        assert!(is_video(&format!("{}.mp4", stem())), "{}", stem());
+        assert!(is_recording_name(&format!("{}.mp4", timestamped_stem())), "{}", timestamped_stem());
         for ours in ["bokehcam 2026-11-23 21-14-05.mp4", "bokehcam 2026-11-23 21-14-05-2.mp4", "bokehcam-12.mp4"] {
-            assert!(is_video(ours), "{ours}");
+            assert!(is_recording_name(ours), "{ours}");
         }
         for others in [
             "holiday.mp4",
@@ -180,20 +180,20 @@ mod tests {
             "bokehcam-.mp4",
             "bokehcam.mp4",
         ] {
-            assert!(!is_video(others), "{others}");
+            assert!(!is_recording_name(others), "{others}");
         }
     }
 
     #[test]
     fn a_name_that_is_taken_gets_a_number() {
         let folder = tempfile::tempdir().unwrap();
-        let folders = Folders::at(folder.path().to_owned());
+        let folders = Folders::single(folder.path().to_owned());
         let taken = std::cell::RefCell::new(Vec::<PathBuf>::new());
         for _ in 0..3 {
-            let path = folders.free_video(|path| taken.borrow().iter().any(|taken| taken == path));
+            let path = folders.unused_video_path(|path| taken.borrow().iter().any(|taken| taken == path));
             std::fs::write(&path, "").unwrap();
-            let next = folders.free_video(|path| taken.borrow().iter().any(|taken| taken == path));
-            assert!(path != next && is_video(next.file_name().unwrap().to_str().unwrap()), "{next:?}");
+            let next = folders.unused_video_path(|path| taken.borrow().iter().any(|taken| taken == path));
+            assert!(path != next && is_recording_name(next.file_name().unwrap().to_str().unwrap()), "{next:?}");
             taken.borrow_mut().push(next);
         }
     }

@@ -1,7 +1,7 @@
 //! Crops: a part of a picture, enlarged to the picture's size.
 
 use super::ColorImage;
-use super::scale::Scale;
+use super::scale::RowScaler;
 
 /// A part of a picture with the picture's aspect ratio, in fractions of its width and height, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ impl Crop {
     pub const WHOLE: Self = Self { center: [0.5; 2], zoom: 1.0 };
 
     /// Returns the crop, moved inside the picture.
-    pub fn inside(self) -> Self {
+    pub fn clamp_inside(self) -> Self {
         let zoom = self.zoom.max(1.0);
         let half = 0.5 / zoom;
         Self { center: self.center.map(|center| center.clamp(half, 1.0 - half)), zoom }
@@ -34,7 +34,7 @@ impl Crop {
 /// Enlarges crops of pictures; owns the scratch memory.
 #[derive(Debug, Default)]
 pub struct Cropper {
-    scale: Scale,
+    scale: RowScaler,
     row: Vec<u16>,
 }
 
@@ -48,9 +48,9 @@ impl Cropper {
             return;
         }
         let parts = [crop.span(0, from.width), crop.span(1, from.height)];
-        self.scale.adapt_part((width, height), parts, (width, height));
+        self.scale.set_crop((width, height), parts, (width, height));
         for (y, row) in into.rgb.chunks_exact_mut(3 * width).enumerate() {
-            self.scale.row(&from.rgb, y, 0..width, &mut self.row, row);
+            self.scale.scale_row(&from.rgb, y, 0..width, &mut self.row, row);
         }
     }
 }
@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn a_part_beyond_the_border_is_moved_inside() {
-        let inside = Crop { center: [0.9, -3.0], zoom: 2.0 }.inside();
+        let inside = Crop { center: [0.9, -3.0], zoom: 2.0 }.clamp_inside();
         assert_eq!(inside, Crop { center: [0.75, 0.25], zoom: 2.0 });
-        assert_eq!(Crop { center: [0.9, 0.1], zoom: 0.5 }.inside(), Crop::WHOLE);
+        assert_eq!(Crop { center: [0.9, 0.1], zoom: 0.5 }.clamp_inside(), Crop::WHOLE);
     }
 }

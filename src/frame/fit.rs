@@ -1,25 +1,25 @@
 //! Letterboxing: scales a whole picture to another size without distortion; the remaining two sides are black bars.
 
 use super::ColorImage;
-use super::scale::Scale;
+use super::scale::RowScaler;
 
 /// Scales pictures; caches scratch memory and weights.
 #[derive(Debug, Default)]
-pub struct Fit {
-    scale: Scale,
+pub struct Letterbox {
+    scale: RowScaler,
     row: Vec<u16>,
 }
 
 /// Position of the scaled picture, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
+struct LetterboxRect {
     left: usize,
     top: usize,
     width: usize,
     height: usize,
 }
 
-impl Fit {
+impl Letterbox {
     /// Scales `from` to the largest size that fits `into`, centred, with black bars on two sides. Enlarges bilinearly;
     /// shrinks with a triangle filter twice as wide as a new pixel, which avoids aliasing. Pictures of equal size are
     /// copied. Allocates only when either size changes.
@@ -30,37 +30,37 @@ impl Fit {
         }
         let [from_width, from_height, width, height] =
             [from.width, from.height, into.width, into.height].map(|side| side as usize);
-        let Some(place) = place((from_width, from_height), (width, height)) else {
+        let Some(rect) = letterbox_rect((from_width, from_height), (width, height)) else {
             into.rgb.fill(0);
             return;
         };
-        self.scale.adapt((from_width, from_height), (place.width, place.height));
+        self.scale.set_sizes((from_width, from_height), (rect.width, rect.height));
 
-        let (above, rest) = into.rgb.split_at_mut(3 * width * place.top);
-        let (rows, below) = rest.split_at_mut(3 * width * place.height);
+        let (above, rest) = into.rgb.split_at_mut(3 * width * rect.top);
+        let (rows, below) = rest.split_at_mut(3 * width * rect.height);
         above.fill(0);
         below.fill(0);
         for (y, line) in rows.chunks_exact_mut(3 * width).enumerate() {
-            let (left, rest) = line.split_at_mut(3 * place.left);
-            let (scaled, right) = rest.split_at_mut(3 * place.width);
+            let (left, rest) = line.split_at_mut(3 * rect.left);
+            let (scaled, right) = rest.split_at_mut(3 * rect.width);
             left.fill(0);
             right.fill(0);
-            self.scale.row(&from.rgb, y, 0..place.width, &mut self.row, scaled);
+            self.scale.scale_row(&from.rgb, y, 0..rect.width, &mut self.row, scaled);
         }
     }
 
-    /// Returns `from` if it has the size of `room`, else its [`fit`](Self::fit) in `room`.
-    pub fn fitted<'a>(&mut self, from: &'a ColorImage, room: &'a mut ColorImage) -> &'a ColorImage {
-        if from.size() == room.size() {
+    /// Returns `from` if it has the size of `target`, else its [`fit`](Self::fit) in `target`.
+    pub fn fit_if_needed<'a>(&mut self, from: &'a ColorImage, target: &'a mut ColorImage) -> &'a ColorImage {
+        if from.size() == target.size() {
             return from;
         }
-        self.fit(from, room);
-        room
+        self.fit(from, target);
+        target
     }
 }
 
 /// Returns the position of the scaled picture; `None` if either picture has no pixels.
-fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
+fn letterbox_rect(from: (usize, usize), into: (usize, usize)) -> Option<LetterboxRect> {
     if from.0 == 0 || from.1 == 0 || into.0 == 0 || into.1 == 0 {
         return None;
     }
@@ -72,7 +72,7 @@ fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
         (scaled(from.0, into.1, from.1).min(into.0), into.1)
     };
     // Even, because chroma subsampling shares colour between pairs of pixels.
-    Some(Place { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
+    Some(LetterboxRect { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
 }
 
 #[cfg(test)]
@@ -87,7 +87,7 @@ mod tests {
     fn fitted(from: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
         // Old content must not be visible.
         let mut into = picture(width, height, |_, _| [77; 3]);
-        Fit::default().fit(from, &mut into);
+        Letterbox::default().fit(from, &mut into);
         into
     }
 
@@ -104,18 +104,18 @@ mod tests {
     #[test]
     fn a_constant_picture_stays_constant_and_its_bars_are_black() {
         let color = [200, 3, 255];
-        for (from, into, place) in [
-            ((640, 480), (1280, 720), Place { left: 160, top: 0, width: 960, height: 720 }),
-            ((1920, 1080), (640, 480), Place { left: 0, top: 60, width: 640, height: 360 }),
-            ((640, 480), (640, 360), Place { left: 80, top: 0, width: 480, height: 360 }),
-            ((1, 1), (9, 4), Place { left: 2, top: 0, width: 4, height: 4 }),
-            ((3, 1000), (20, 10), Place { left: 8, top: 0, width: 1, height: 10 }),
-            ((1280, 720), (320, 180), Place { left: 0, top: 0, width: 320, height: 180 }),
+        for (from, into, rect) in [
+            ((640, 480), (1280, 720), LetterboxRect { left: 160, top: 0, width: 960, height: 720 }),
+            ((1920, 1080), (640, 480), LetterboxRect { left: 0, top: 60, width: 640, height: 360 }),
+            ((640, 480), (640, 360), LetterboxRect { left: 80, top: 0, width: 480, height: 360 }),
+            ((1, 1), (9, 4), LetterboxRect { left: 2, top: 0, width: 4, height: 4 }),
+            ((3, 1000), (20, 10), LetterboxRect { left: 8, top: 0, width: 1, height: 10 }),
+            ((1280, 720), (320, 180), LetterboxRect { left: 0, top: 0, width: 320, height: 180 }),
         ] {
             let scaled = fitted(&picture(from.0, from.1, |_, _| color), into);
             let inside = |x: u32, y: u32| {
-                (place.left..place.left + place.width).contains(&(x as usize))
-                    && (place.top..place.top + place.height).contains(&(y as usize))
+                (rect.left..rect.left + rect.width).contains(&(x as usize))
+                    && (rect.top..rect.top + rect.height).contains(&(y as usize))
             };
             let expected = picture(into.0, into.1, |x, y| if inside(x, y) { color } else { [0; 3] });
             assert_eq!(scaled, expected, "{from:?} into {into:?}");

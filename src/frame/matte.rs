@@ -21,7 +21,7 @@ pub struct MixedPixel {
     /// Alpha of the nearer surface, 0 to 1.
     pub alpha: f32,
     /// Known fraction of the farther surface, 0 to 1: its visible fraction, or 1 if it is known from elsewhere.
-    pub behind: f32,
+    pub background_alpha: f32,
     /// Colour of the nearer surface minus that of the farther one: linear light, red, green and blue.
     pub difference: [f32; 3],
 }
@@ -56,12 +56,12 @@ pub struct Matte {
 impl Matte {
     /// Returns the largest valid number of mixed pixels: with more, the depth is noise, and the picture is blurred
     /// without the matte.
-    pub fn most(width: usize, height: usize) -> usize {
+    pub fn max_pixels(width: usize, height: usize) -> usize {
         width * height / 4
     }
 
     /// Returns the mixed pixels among the pixels `range`.
-    pub fn within(&self, range: Range<usize>) -> &[MixedPixel] {
+    pub fn pixels_in(&self, range: Range<usize>) -> &[MixedPixel] {
         let until = |end: usize| self.pixels.partition_point(|pixel| (pixel.at as usize) < end);
         &self.pixels[until(range.start)..until(range.end)]
     }

@@ -17,40 +17,40 @@ const VALUES: usize = 4;
 
 /// Scaler from one size to another.
 #[derive(Debug, Default)]
-pub struct Scale {
+pub struct RowScaler {
     arch: Arch,
     across: Axis,
     down: Axis,
 }
 
-impl Scale {
+impl RowScaler {
     /// Sets the sizes (columns, rows), all sides above 0. Allocates only when a size changes.
-    pub fn adapt(&mut self, from: (usize, usize), to: (usize, usize)) {
-        self.adapt_part(from, [(0.0, from.0 as f64), (0.0, from.1 as f64)], to);
+    pub fn set_sizes(&mut self, from: (usize, usize), to: (usize, usize)) {
+        self.set_crop(from, [(0.0, from.0 as f64), (0.0, from.1 as f64)], to);
     }
 
     /// Sets the sizes for a part of the source, given by start and length across and down, in fractional pixels. The
     /// part is inside the source. Changing only the part does not allocate.
-    pub fn adapt_part(&mut self, from: (usize, usize), [across, down]: [(f64, f64); 2], to: (usize, usize)) {
+    pub fn set_crop(&mut self, from: (usize, usize), [across, down]: [(f64, f64); 2], to: (usize, usize)) {
         self.across.adapt(from.0, across, to.0);
         self.down.adapt(from.1, down, to.1);
     }
 
     /// Writes these `columns` of row `y` of the scaled picture to `scaled`, 3 bytes each. `from` is the whole source;
     /// `scratch` grows to one row of it.
-    pub fn row(&self, from: &[u8], y: usize, columns: Range<usize>, scratch: &mut Vec<u16>, scaled: &mut [u8]) {
+    pub fn scale_row(&self, from: &[u8], y: usize, columns: Range<usize>, scratch: &mut Vec<u16>, scaled: &mut [u8]) {
         if columns.is_empty() {
             return;
         }
         // Four values are read per pixel.
         scratch.resize(3 * self.across.from + 1, 0);
-        self.arch.dispatch(Row { scale: self, from, y, columns, row: scratch, scaled });
+        self.arch.dispatch(ScaleRow { scale: self, from, y, columns, row: scratch, scaled });
     }
 }
 
 /// Some columns of one row.
-struct Row<'a> {
-    scale: &'a Scale,
+struct ScaleRow<'a> {
+    scale: &'a RowScaler,
     from: &'a [u8],
     y: usize,
     columns: Range<usize>,
@@ -58,17 +58,17 @@ struct Row<'a> {
     scaled: &'a mut [u8],
 }
 
-impl WithSimd for Row<'_> {
+impl WithSimd for ScaleRow<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { scale: Scale { across, down, .. }, from, y, columns, row, scaled } = self;
+        let Self { scale: RowScaler { across, down, .. }, from, y, columns, row, scaled } = self;
         let stride = 3 * across.from;
         let (first, weights) = down.taps(y);
         let needed = across.source_range(&columns);
         let needed = 3 * needed.start..3 * needed.end;
         filter_down(&from[stride * first + needed.start..], stride, weights, &mut row[needed]);
-        across.filter(row, columns, scaled);
+        across.filter_columns(row, columns, scaled);
     }
 }
 
@@ -84,20 +84,20 @@ fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
     match *weights {
         [a, b] => {
             for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
-                *sum = weigh(upper, a) + weigh(lower, b);
+                *sum = apply_weight(upper, a) + apply_weight(lower, b);
             }
         }
         [a, b, c] => {
             let (second, third) = (&rows[stride..], &rows[2 * stride..]);
             for (((sum, &upper), &middle), &lower) in row.iter_mut().zip(rows).zip(second).zip(third) {
-                *sum = weigh(upper, a) + weigh(middle, b) + weigh(lower, c);
+                *sum = apply_weight(upper, a) + apply_weight(middle, b) + apply_weight(lower, c);
             }
         }
         _ => {
             row.fill(0);
             for (values, &weight) in rows.chunks(stride).zip(weights) {
                 for (sum, &value) in row.iter_mut().zip(values) {
-                    *sum += weigh(value, weight);
+                    *sum += apply_weight(value, weight);
                 }
             }
         }
@@ -106,7 +106,7 @@ fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
 
 /// Multiplies a code by a weight below [`ONE`].
 #[inline(always)]
-fn weigh(code: u8, weight: u16) -> u16 {
+fn apply_weight(code: u8, weight: u16) -> u16 {
     multiply_high(u16::from(code) << VALUE_BITS, to_u16_weight(weight))
 }
 
@@ -185,7 +185,7 @@ impl Axis {
 
     /// Filters part of a row of 3-channel pixels.
     #[inline(always)]
-    fn filter(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
+    fn filter_columns(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
         let to = self.firsts.len();
         for (block, scaled) in scaled.as_chunks_mut::<3>().0.chunks_mut(BLOCK).enumerate() {
             let at = columns.start + block * BLOCK;

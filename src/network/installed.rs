@@ -11,8 +11,11 @@ use crate::files::{data, input};
 pub fn model_folders() -> Vec<PathBuf> {
     let bundled = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
     let mut folders = Vec::new();
-    for folder in
-        data::own().into_iter().chain(bundled).chain(data::system()).map(|folder| folder.join("bokehcam/models"))
+    for folder in data::user_data_dir()
+        .into_iter()
+        .chain(bundled)
+        .chain(data::system_data_dirs())
+        .map(|folder| folder.join("bokehcam/models"))
     {
         if !folders.contains(&folder) {
             folders.push(folder);

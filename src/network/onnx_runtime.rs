@@ -54,7 +54,7 @@ fn load_library() -> Result<Environment, String> {
 
 /// Returns what the loader opens: a bare name, which it searches among the system's libraries, or a trusted file.
 fn resolve_library(library: &Path) -> Result<PathBuf, String> {
-    if library.is_absolute() { trusted::code(library) } else { Ok(library.to_owned()) }
+    if library.is_absolute() { trusted::resolve_code_path(library) } else { Ok(library.to_owned()) }
 }
 
 /// Returns the libraries to try; only the user's choice if there is one.
@@ -75,7 +75,8 @@ fn candidate_libraries() -> Result<Vec<PathBuf>, String> {
     }
     let mut found: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
     // Installed by pip, for the user or in the active virtual environment.
-    let roots = [trusted::absolute("VIRTUAL_ENV"), trusted::absolute("HOME").map(|home| home.join(".local"))];
+    let roots =
+        [trusted::absolute_env_path("VIRTUAL_ENV"), trusted::absolute_env_path("HOME").map(|home| home.join(".local"))];
     for python in roots.into_iter().flatten().flat_map(|root| list_folder(&root.join("lib"))) {
         let capi = python.join("site-packages/onnxruntime/capi");
         found.extend(list_folder(&capi).into_iter().filter(|file| {

@@ -17,7 +17,7 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::link::{Receiver, Sender};
 use crate::optics::CocField;
-use crate::stats::{BlurTimings, Cause};
+use crate::stats::{BlurTimings, DropCause};
 
 /// A blurred picture, with its inputs.
 pub(super) struct Blurred {
@@ -129,7 +129,7 @@ impl<'a> Stage<'a> {
         let Shared { clock, tally, is_viewed, .. } = self.shared;
         let (frame, Prepared { color, depth, coc, composed, .. }) = frame.take_item(clock.now_ns());
         if self.is_late(&frame, 0) {
-            tally.dropped(frame.ticket, Cause::Late);
+            tally.count_dropped(frame.ticket, DropCause::Late);
             return true;
         }
         let (picture, depth) = (Picture::from_memory(color), depth.filter(|_| *is_viewed));
@@ -144,7 +144,7 @@ impl<'a> Stage<'a> {
         // The frame queues behind those in flight.
         let expected_ns = self.blur.picker.expected_blur_ns() * (self.in_flight.len() as u64 + 1);
         if self.is_late(&frame, expected_ns) {
-            tally.dropped(frame.ticket, Cause::Late);
+            tally.count_dropped(frame.ticket, DropCause::Late);
             self.blur.picker.record_late_frame();
             plan.set(self.blur.picker.plan());
             return Ok(false);
@@ -160,7 +160,7 @@ impl<'a> Stage<'a> {
         let job = Job { ticket, color, depth, coc, quality, place, out, yuyv, on_device };
         let submitted = self.blur.submit(job);
         if let Err(error) = submitted {
-            tally.dropped(frame.ticket, Cause::Failed);
+            tally.count_dropped(frame.ticket, DropCause::Failed);
             return Err(error.into());
         }
         self.in_flight.push_back(frame.with_item(InFlight { coc, crop, original }));
@@ -176,7 +176,10 @@ impl<'a> Stage<'a> {
             Ok(None) if wait => return Err(Fault::LostFrame),
             Ok(None) => return Ok(true),
             Err(error) => {
-                self.in_flight.pop_front().into_iter().for_each(|frame| tally.dropped(frame.ticket, Cause::Failed));
+                self.in_flight
+                    .pop_front()
+                    .into_iter()
+                    .for_each(|frame| tally.count_dropped(frame.ticket, DropCause::Failed));
                 return Err(error.into());
             }
         };

@@ -10,7 +10,7 @@ use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::link::Sender;
 use crate::link::demand::Demand;
 use crate::link::pool::Pooled;
-use crate::stats::{Cause, Histogram};
+use crate::stats::{DropCause, Histogram};
 
 /// A picture, with the depth or right picture that the camera delivered.
 pub(super) struct CapturedFrame {
@@ -72,7 +72,7 @@ impl<'a> Stage<'a> {
                 self.pacer.shift_schedule(clock.now_ns() - pause_began_ns);
                 continue;
             }
-            tally.lost(self.pacer.skip_late_frames(&mut *self.camera), Cause::Driver);
+            tally.count_lost(self.pacer.skip_late_frames(&mut *self.camera), DropCause::Driver);
             let mut color = pools.colors.take();
             let mut depth = (frame_data == FrameData::Depth).then(|| pools.depths.take());
             let mut right = (frame_data == FrameData::RightCamera).then(|| pools.rights.take());
@@ -92,7 +92,7 @@ impl<'a> Stage<'a> {
                         Some(captured_ns) => captured_ns,
                         None => self.pacer.wait_until_due(stamp.time_ns, read_ns, || stopped() || has_request()),
                     };
-                    let ticket = tally.captured(captured_ns);
+                    let ticket = tally.count_captured(captured_ns);
                     let since_ns = clock.now_ns();
                     // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
                     let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
@@ -113,7 +113,7 @@ impl<'a> Stage<'a> {
                     }
                 }
                 Captured::Corrupt(error) => {
-                    tally.lost(1, Cause::Corrupt);
+                    tally.count_lost(1, DropCause::Corrupt);
                     if !keep_going {
                         return Err(error.into());
                     }
@@ -122,7 +122,7 @@ impl<'a> Stage<'a> {
                         has_warned = true;
                     }
                 }
-                Captured::Lost(count, cause) => tally.lost(count, cause),
+                Captured::Lost(count, cause) => tally.count_lost(count, cause),
                 Captured::Waiting => {}
                 Captured::End => break,
             }

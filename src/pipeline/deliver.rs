@@ -14,7 +14,7 @@ use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
 use crate::optics::CocField;
 use crate::sink::{Sink, SinkError};
-use crate::stats::{Cause, SinkTimings, Ticket};
+use crate::stats::{DropCause, FrameTicket, SinkTimings};
 
 pub(super) struct Stage<'a> {
     sink: &'a mut dyn Sink,
@@ -80,7 +80,7 @@ impl<'a> Stage<'a> {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
-                    tally.dropped(frame.ticket, Cause::Failed);
+                    tally.count_dropped(frame.ticket, DropCause::Failed);
                     return Err(error.into());
                 }
             };
@@ -96,10 +96,10 @@ impl<'a> Stage<'a> {
             let kept = was_given && self.sink.has_outputs();
             let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
-            done.into_iter().for_each(|ticket| tally.delivered(ticket));
+            done.into_iter().for_each(|ticket| tally.count_delivered(ticket));
             if let Some(view) = &mut self.view {
                 let Blurred { picture, color, depth, coc, crop } = blurred;
-                let frames = tally.frames();
+                let frames = tally.frame_counts();
                 let view_of = View {
                     picture,
                     color,
@@ -132,7 +132,7 @@ impl<'a> Stage<'a> {
     /// Reports the progress of the run; `quality` is that of the last frame.
     fn report_progress(&self, quality: Option<Quality>) {
         let Shared { tally, info, .. } = self.shared;
-        let frames = tally.frames();
+        let frames = tally.frame_counts();
         (self.progress)(Progress {
             captured: frames.captured,
             delivered: frames.delivered,
@@ -175,10 +175,10 @@ impl<'a> Stage<'a> {
     }
 
     /// Counts a frame whose delivery depended on the viewer: delivered if it was taken, otherwise evicted.
-    fn count_viewed(&self, taken: bool, ticket: Option<Ticket>) {
+    fn count_viewed(&self, taken: bool, ticket: Option<FrameTicket>) {
         match ticket {
-            Some(ticket) if taken => self.shared.tally.delivered(ticket),
-            Some(ticket) => self.shared.tally.dropped(ticket, Cause::Evicted),
+            Some(ticket) if taken => self.shared.tally.count_delivered(ticket),
+            Some(ticket) => self.shared.tally.count_dropped(ticket, DropCause::Evicted),
             None => {}
         }
     }

@@ -16,7 +16,7 @@ use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::Pooled;
 use crate::link::{Received, Receiver, Sender};
 use crate::optics::CocField;
-use crate::stats::{Cause, DepthTimings};
+use crate::stats::{DepthTimings, DropCause};
 
 /// After this time without a frame there are no viewers, and a depth camera may pause.
 const IDLE: Duration = Duration::from_secs(3);
@@ -92,11 +92,11 @@ impl<'a> Stage<'a> {
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
                         // A depth camera without a map so far will deliver one soon.
-                        Fault::Depth(DepthError::Unpaired { .. }) => (Cause::Unpaired, true),
-                        Fault::Depth(_) => (Cause::Corrupt, self.shared.keep_going),
-                        _ => (Cause::Failed, false),
+                        Fault::Depth(DepthError::Unpaired { .. }) => (DropCause::Unpaired, true),
+                        Fault::Depth(_) => (DropCause::Corrupt, self.shared.keep_going),
+                        _ => (DropCause::Failed, false),
                     };
-                    tally.dropped(frame.ticket, cause);
+                    tally.count_dropped(frame.ticket, cause);
                     if !goes_on {
                         return Err(fault);
                     }

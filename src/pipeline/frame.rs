@@ -3,11 +3,11 @@
 use super::Trace;
 use crate::frame::Stamp;
 use crate::link::{self, Sender};
-use crate::stats::{Cause, Tally, Ticket};
+use crate::stats::{DropCause, FrameCounter, FrameTicket};
 
 /// A frame in the pipeline: its identity, its times, and its data at this point.
 pub(super) struct Frame<T> {
-    pub ticket: Ticket,
+    pub ticket: FrameTicket,
     pub stamp: Stamp,
     /// The number of the last seek ([`Seeker`](crate::capture::Seeker)) before it; 0 if there was none.
     pub seek: u64,
@@ -36,11 +36,11 @@ impl<T> Frame<T> {
 
     /// Sends it to the next stage, and counts an older frame that it displaced; returns whether the output is still
     /// open.
-    pub fn send_to(self, to: &mut Sender<Self>, tally: &Tally) -> bool {
+    pub fn send_to(self, to: &mut Sender<Self>, tally: &FrameCounter) -> bool {
         match to.send(self) {
             Ok(None) => true,
             Ok(Some(older)) => {
-                tally.dropped(older.ticket, Cause::Evicted);
+                tally.count_dropped(older.ticket, DropCause::Evicted);
                 true
             }
             // The frame's fate is unknown: it stays in flight.

@@ -123,7 +123,8 @@ mod tests {
             color.rgb[3 * at as usize..][..3].copy_from_slice(&if near { [luma, 40, 40] } else { [40, luma, 200] });
             map.metres[at as usize] = if near { 1.0 } else { 9.0 };
             if near && x == 240 {
-                let pixel = MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha: 0.5, behind: 0.5, difference: [0.1; 3] };
+                let pixel =
+                    MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha: 0.5, background_alpha: 0.5, difference: [0.1; 3] };
                 map.matte.pixels.push(pixel);
             }
         }
@@ -149,11 +150,11 @@ mod tests {
         let light = srgb_to_linear_table();
         let mut color = ColorImage::new(3, 1);
         color.rgb.copy_from_slice(&[200, 60, 60, 148, 60, 148, 30, 60, 200]);
-        let pixel = |at: u32, alpha: f32, behind: f32| {
+        let pixel = |at: u32, alpha: f32, background_alpha: f32| {
             let own = [0, 1, 2].map(|p| light[usize::from(color.rgb[3 * at as usize + p])]);
             let far = [light[30], light[60], light[200]];
             let difference = std::array::from_fn(|p| (own[p] - far[p]) / alpha);
-            MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha, behind, difference }
+            MixedPixel { at, near_m: 1.0, far_m: 9.0, alpha, background_alpha, difference }
         };
         let mut map = DepthMap { subject_m: Some(1.0), ..DepthMap::new(3, 1) };
         map.matte.pixels = vec![pixel(0, 1.0, 1.0), pixel(1, 0.5, 1.0)];

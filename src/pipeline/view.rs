@@ -6,7 +6,7 @@ use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
-use crate::stats::Frames;
+use crate::stats::FrameCounts;
 
 /// The progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct View {
     /// Its processing times.
     pub trace: Trace,
     /// The counts of the run up to this frame.
-    pub frames: Frames,
+    pub frames: FrameCounts,
 }
 
 impl View {
@@ -69,7 +69,7 @@ impl View {
             seek: 0,
             is_seek_target: false,
             trace: Trace::default(),
-            frames: Frames::default(),
+            frames: FrameCounts::default(),
         }
     }
 }

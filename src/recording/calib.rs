@@ -13,11 +13,11 @@ impl Geometry {
     /// # Errors
     /// The file is unreadable, of another format, lacks a key, or has invalid numbers.
     pub fn read(file: &Path, left: &Path) -> Result<Self, RecordingError> {
-        Self::read_as(file, |text| {
+        Self::read_with(file, |text| {
             if middlebury::calib::is_middlebury(text) {
                 middlebury::calib::parse(text)
             } else {
-                kitti::calib::parse(text, kitti::camera_of(left))
+                kitti::calib::parse(text, kitti::find_left_camera(left))
             }
         })
     }

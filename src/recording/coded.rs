@@ -11,10 +11,10 @@ use image::codecs::jpeg::JpegDecoder;
 use image::{ColorType, ImageDecoder, ImageError};
 
 use super::MAX_SIDE_PX;
-use super::extras::Extras;
 use super::fault::PictureFault;
 use super::jpeg;
-use super::samples::Samples;
+use super::photo_metadata::PhotoMetadata;
+use super::samples::SampleFormat;
 use crate::files::input;
 
 /// Far more than a photograph of 8192 x 8192 pixels needs.
@@ -35,7 +35,7 @@ enum Format {
 }
 
 /// A picture whose header was read.
-pub(super) enum Coded<'a> {
+pub(super) enum EncodedPicture<'a> {
     /// Decoded straight from disk.
     Png(Box<png::Reader<BufReader<File>>>),
     Jpeg(Box<JpegDecoder<Cursor<&'a [u8]>>>),
@@ -43,19 +43,19 @@ pub(super) enum Coded<'a> {
 
 /// The position of a run of pixels: index of the first one in row-major order, and distance to the next.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
+pub(super) struct PixelRun {
     pub(super) first: usize,
     pub(super) step: usize,
 }
 
-impl<'a> Coded<'a> {
+impl<'a> EncodedPicture<'a> {
     /// Opens a PNG or JPEG; `memory` receives a file that must be read completely.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
         let (mut file, format) = open_detected(path)?;
         let coded = match format {
-            Some(Format::Png) => Self::Png(Box::new(png_decoder(file)?.read_info().map_err(png_fault)?)),
+            Some(Format::Png) => Self::Png(Box::new(create_png_decoder(file)?.read_info().map_err(png_fault)?)),
             Some(Format::Jpeg) => {
-                let ((width, height), _) = jpeg::header(&mut BufReader::new(&mut file))?;
+                let ((width, height), _) = jpeg::read_header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
                 // The decoder would fill missing data with grey.
@@ -78,26 +78,26 @@ impl<'a> Coded<'a> {
         }
     }
 
-    pub(super) fn samples(&self) -> Samples {
+    pub(super) fn samples(&self) -> SampleFormat {
         match self {
             Self::Png(reader) => {
                 let (color, depth) = reader.output_color_type();
-                Samples { channels: color.samples(), are_wide: depth == png::BitDepth::Sixteen }
+                SampleFormat { channels: color.samples(), is_16bit: depth == png::BitDepth::Sixteen }
             }
             Self::Jpeg(decoder) => {
-                Samples { channels: usize::from(decoder.color_type().channel_count()), are_wide: false }
+                SampleFormat { channels: usize::from(decoder.color_type().channel_count()), is_16bit: false }
             }
         }
     }
 
-    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`Coded::decode_runs`] makes. The caller
+    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`EncodedPicture::decode_runs`] makes. The caller
     /// checks that the samples are 8-bit RGB.
-    pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<Extras, PictureFault> {
+    pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<PhotoMetadata, PictureFault> {
         match self {
             Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
-                let extras = Extras::of_jpeg(&mut decoder);
+                let metadata = PhotoMetadata::from_jpeg(&mut decoder);
                 decoder.read_image(into).map_err(jpeg_fault)?;
-                Ok(extras)
+                Ok(metadata)
             }
             other => other.decode_runs(memory, |run, row| {
                 if run.step == 1 {
@@ -110,52 +110,52 @@ impl<'a> Coded<'a> {
         }
     }
 
-    /// Decodes the picture and calls `each` for every run of pixels with its bytes, in the format of
-    /// [`Coded::samples`]: a row of a PNG, or a whole JPEG. `memory` is working memory.
+    /// Decodes the picture and calls `on_run` for every run of pixels with its bytes, in the format of
+    /// [`EncodedPicture::samples`]: a row of a PNG, or a whole JPEG. `memory` is working memory.
     pub(super) fn decode_runs(
         mut self,
         memory: &mut Vec<u8>,
-        mut each: impl FnMut(Run, &[u8]),
-    ) -> Result<Extras, PictureFault> {
+        mut on_run: impl FnMut(PixelRun, &[u8]),
+    ) -> Result<PhotoMetadata, PictureFault> {
         let bytes_per_pixel = self.samples().bytes_per_pixel();
         let (width, height) = self.size();
         let (width, height) = (width as usize, height as usize);
         match self {
             Self::Png(ref mut reader) => {
                 memory.resize(width * bytes_per_pixel, 0);
-                for (run, pixels) in png_runs(width, height, reader.info().interlaced) {
+                for (run, pixels) in png_pixel_runs(width, height, reader.info().interlaced) {
                     reader.read_row(memory).map_err(png_fault)?.ok_or(PictureFault::Truncated)?;
-                    each(run, &memory[..pixels * bytes_per_pixel]);
+                    on_run(run, &memory[..pixels * bytes_per_pixel]);
                 }
                 // Reading beyond the last row makes the decoder check the end of the coded data.
                 reader.read_row(memory).map_err(png_fault)?;
                 // Metadata may follow the pixels; a fault in it must not reject the picture.
                 let _ = reader.finish();
-                Ok(Extras::of_png(reader.info()))
+                Ok(PhotoMetadata::from_png(reader.info()))
             }
             Self::Jpeg(mut decoder) => {
-                let extras = Extras::of_jpeg(&mut decoder);
+                let metadata = PhotoMetadata::from_jpeg(&mut decoder);
                 memory.resize(width * height * bytes_per_pixel, 0);
                 decoder.read_image(memory).map_err(jpeg_fault)?;
-                each(Run { first: 0, step: 1 }, memory);
-                Ok(extras)
+                on_run(PixelRun { first: 0, step: 1 }, memory);
+                Ok(metadata)
             }
         }
     }
 }
 
 /// Reads width, height and samples of a PNG or JPEG from its header only.
-pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault> {
+pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), PictureFault> {
     let (file, format) = open_detected(path)?;
     let (size, samples) = match format {
         Some(Format::Png) => {
-            let mut decoder = png_decoder(file)?;
+            let mut decoder = create_png_decoder(file)?;
             let info = decoder.read_header_info().map_err(png_fault)?;
             // A palette is expanded to RGB.
             let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
-            (info.size(), Samples { channels, are_wide: info.bit_depth == png::BitDepth::Sixteen })
+            (info.size(), SampleFormat { channels, is_16bit: info.bit_depth == png::BitDepth::Sixteen })
         }
-        Some(Format::Jpeg) => jpeg::header(&mut BufReader::new(file))?,
+        Some(Format::Jpeg) => jpeg::read_header(&mut BufReader::new(file))?,
         _ => return Err(PictureFault::Format("PNG or JPEG")),
     };
     check_size(size.0, size.1)?;
@@ -171,12 +171,12 @@ pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [
 }
 
 /// Reads the header of a PNG and the metadata before its pixels.
-pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
+pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
     let (file, format) = open_detected(path)?;
     if format != Some(Format::Png) {
         return Err(PictureFault::Format("PNG"));
     }
-    Ok(png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
+    Ok(create_png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
 }
 
 /// Opens a regular file and detects its format by the first bytes; `None` if unsupported. The file is rewound.
@@ -202,14 +202,14 @@ fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
     Ok((file, Some(format)))
 }
 
-fn read_from_start(mut file: File, most_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
+fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
     let bytes = file.metadata()?.len();
-    if bytes > most_bytes {
-        return Err(PictureFault::FileSize { bytes, most_bytes });
+    if bytes > max_bytes {
+        return Err(PictureFault::FileSize { bytes, max_bytes });
     }
     memory.clear();
     file.rewind()?;
-    file.take(most_bytes).read_to_end(memory)?;
+    file.take(max_bytes).read_to_end(memory)?;
     Ok(memory)
 }
 
@@ -223,7 +223,7 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
     }
 }
 
-fn png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault> {
+fn create_png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault> {
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), png::Limits { bytes: MAX_METADATA_BYTES });
     // Expands palettes and samples of fewer than 8 bits.
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -234,7 +234,7 @@ fn png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault
 }
 
 /// Returns the runs of a PNG's rows, in stored order, and the pixels of each.
-fn png_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<Item = (Run, usize)> {
+fn png_pixel_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<Item = (PixelRun, usize)> {
     /// First column, column step, first row, row step.
     const WHOLE: [[usize; 4]; 1] = [[0, 1, 0, 1]];
     const ADAM7: [[usize; 4]; 7] =
@@ -243,24 +243,24 @@ fn png_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<I
     // A pass without columns has no rows.
     passes.iter().filter(move |pass| pass[0] < width).flat_map(move |&[column, step, row, row_step]| {
         let pixels = (width - column).div_ceil(step);
-        (row..height).step_by(row_step).map(move |row| (Run { first: row * width + column, step }, pixels))
+        (row..height).step_by(row_step).map(move |row| (PixelRun { first: row * width + column, step }, pixels))
     })
 }
 
 pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {
     match error {
         png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => damaged(&other),
+        other => damaged_fault(&other),
     }
 }
 
 fn jpeg_fault(error: ImageError) -> PictureFault {
     match error {
         ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => damaged(&other),
+        other => damaged_fault(&other),
     }
 }
 
-fn damaged(error: &dyn std::error::Error) -> PictureFault {
+fn damaged_fault(error: &dyn std::error::Error) -> PictureFault {
     PictureFault::Damaged(error.to_string().replace('\n', " "))
 }

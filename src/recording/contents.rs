@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
-use super::{Options, Pair, Unpaired};
+use super::{Options, StereoGeometry, Unpaired};
 use crate::optics::StereoRig;
 
 /// A recording layout: its detection and its reader.
@@ -16,36 +16,36 @@ pub(super) struct Layout {
     /// The name for users, such as `TUM RGB-D`.
     pub(super) name: &'static str,
     /// The files that identify it, for messages.
-    pub(super) looked_for: &'static str,
+    pub(super) expected_files: &'static str,
     /// Whether the folder has this layout.
-    pub(super) is_in: fn(&Path) -> bool,
+    pub(super) matches_folder: fn(&Path) -> bool,
     /// Reads its lists and calibrations.
-    pub(super) open: fn(&Folder, &Options) -> Result<Contents, RecordingError>,
+    pub(super) open: fn(&RecordingFolder, &Options) -> Result<Contents, RecordingError>,
 }
 
 /// The content of a recording.
 #[derive(Debug)]
 pub(super) struct Contents {
-    pub(super) frames: Vec<Listed>,
-    pub(super) depth: Option<DepthForm>,
-    pub(super) pair: Option<Pair>,
+    pub(super) frames: Vec<ListedFrame>,
+    pub(super) depth: Option<DepthFormat>,
+    pub(super) stereo_geometry: Option<StereoGeometry>,
     /// Number of disparities to search, from 0, if stated: a multiple of 16.
-    pub(super) disparities: Option<u32>,
+    pub(super) disparity_count: Option<u32>,
     pub(super) unpaired: Unpaired,
 }
 
 /// A frame of a list. Known times increase strictly.
 #[derive(Debug)]
-pub(super) struct Listed {
+pub(super) struct ListedFrame {
     pub(super) time_ns: Option<u64>,
-    pub(super) color: Source,
-    pub(super) right: Option<Source>,
-    pub(super) depth: Option<Source>,
+    pub(super) color: PictureSource,
+    pub(super) right: Option<PictureSource>,
+    pub(super) depth: Option<PictureSource>,
 }
 
 /// The encoding of depth.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum DepthForm {
+pub(super) enum DepthFormat {
     Units(DepthUnits),
     /// Relative inverse depth in grey pictures: black is the farthest and white the nearest, or the other way round.
     Inverse {
@@ -57,7 +57,7 @@ pub(super) enum DepthForm {
 
 /// The folder of a recording.
 #[derive(Debug)]
-pub(super) struct Folder {
+pub(super) struct RecordingFolder {
     /// The path as given, for messages.
     pub(super) dir: PathBuf,
     /// The path with all links resolved: no picture may lie outside it.
@@ -66,29 +66,29 @@ pub(super) struct Folder {
 
 /// A line of a list, for messages.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct ListPosition {
     pub(super) list: &'static str,
     pub(super) line: u32,
 }
 
 /// A picture, and the line that names it.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(super) struct PictureSource {
     /// `None` if it was found in its folder instead of a list.
-    pub(super) place: Option<Place>,
-    /// Path relative to the recording's folder. Only a picture with a `place` can have a fault.
+    pub(super) position: Option<ListPosition>,
+    /// Path relative to the recording's folder. Only a picture with a `position` can have a fault.
     pub(super) file: Result<PathBuf, LineFault>,
 }
 
-impl Folder {
+impl RecordingFolder {
     /// Returns the path of a picture with all links resolved.
-    pub(super) fn locate(&self, source: &Source) -> Result<PathBuf, RecordingError> {
+    pub(super) fn locate(&self, source: &PictureSource) -> Result<PathBuf, RecordingError> {
         let path = self.root.join(source.file(&self.dir)?);
         // A path that cannot be resolved cannot be read either, and the reader reports why.
         self.within(path.canonicalize().unwrap_or(path), source)
     }
 
-    fn within(&self, path: PathBuf, source: &Source) -> Result<PathBuf, RecordingError> {
+    fn within(&self, path: PathBuf, source: &PictureSource) -> Result<PathBuf, RecordingError> {
         if path.starts_with(&self.root) { Ok(path) } else { Err(source.error(&self.dir, PictureFault::Outside)) }
     }
 }
@@ -100,19 +100,19 @@ const SLOW_LOOKUP: Duration = Duration::from_secs(2);
 
 /// Locates the pictures of long lists: caches resolved folders, and warns if it takes long.
 pub(super) struct Locator<'a> {
-    folder: &'a Folder,
+    folder: &'a RecordingFolder,
     resolved: HashMap<PathBuf, PathBuf>,
     began: Instant,
     has_warned: bool,
 }
 
 impl<'a> Locator<'a> {
-    pub(super) fn new(folder: &'a Folder) -> Self {
+    pub(super) fn new(folder: &'a RecordingFolder) -> Self {
         Self { folder, resolved: HashMap::new(), began: Instant::now(), has_warned: false }
     }
 
-    /// Same as [`Folder::locate`].
-    pub(super) fn locate(&mut self, source: &Source) -> Result<PathBuf, RecordingError> {
+    /// Same as [`RecordingFolder::locate`].
+    pub(super) fn locate(&mut self, source: &PictureSource) -> Result<PathBuf, RecordingError> {
         if !self.has_warned && self.began.elapsed() > SLOW_LOOKUP {
             self.has_warned = true;
             tracing::warn!("{}: searching the pictures for a readable one; this takes long", self.folder.dir.display());
@@ -129,16 +129,17 @@ impl<'a> Locator<'a> {
     }
 }
 
-impl Source {
+impl PictureSource {
     /// Creates a source for a picture that is in no list.
-    pub(super) fn found(file: PathBuf) -> Self {
-        Self { place: None, file: Ok(file) }
+    pub(super) fn from_path(file: PathBuf) -> Self {
+        Self { position: None, file: Ok(file) }
     }
 
     /// Returns the file, or the fault of the line that should name it.
     pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
         self.file.as_deref().map_err(|fault| {
-            let (list, line) = self.place.map_or((dir.to_owned(), 0), |place| (dir.join(place.list), place.line));
+            let (list, line) =
+                self.position.map_or((dir.to_owned(), 0), |position| (dir.join(position.list), position.line));
             RecordingError::Line { list, line, fault: fault.clone() }
         })
     }
@@ -146,8 +147,8 @@ impl Source {
     /// Returns the error for a picture with `fault`, with the line that names it.
     pub(super) fn error(&self, dir: &Path, fault: PictureFault) -> RecordingError {
         let file = self.file.clone().unwrap_or_default();
-        match self.place {
-            Some(Place { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
+        match self.position {
+            Some(ListPosition { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
             None => RecordingError::Picture { path: dir.join(file), fault },
         }
     }
@@ -157,7 +158,7 @@ impl Source {
 ///
 /// # Errors
 /// The folder cannot be listed, or contains no such file.
-pub(super) fn numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
+pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
     let is_picture = |name: &String| {
         let (stem, extension) = name.rsplit_once('.').unwrap_or_default();
         !stem.is_empty()

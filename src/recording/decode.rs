@@ -4,11 +4,11 @@ use std::path::Path;
 
 use pulp::{Arch, WithSimd};
 
-use super::coded::{self, Coded};
+use super::coded::{self, EncodedPicture};
 use super::depth_covers;
-use super::extras::Extras;
 use super::fault::PictureFault;
-use super::samples::Samples;
+use super::photo_metadata::PhotoMetadata;
+use super::samples::SampleFormat;
 use crate::color::luminance;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
@@ -41,45 +41,45 @@ pub(super) struct DepthUnits {
 
 /// The kind of a picture according to its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum PictureKind {
     Color,
     Depth,
     Grey,
 }
 
 /// Reads width, height and kind of a picture from its header only.
-pub(super) fn header(path: &Path) -> Result<((u32, u32), Kind), PictureFault> {
-    let (size, samples) = coded::header(path)?;
+pub(super) fn read_header(path: &Path) -> Result<((u32, u32), PictureKind), PictureFault> {
+    let (size, samples) = coded::read_header(path)?;
     let kind = match samples {
-        samples if samples.is_depth() => Kind::Depth,
-        samples if samples.has_color() => Kind::Color,
-        _ => Kind::Grey,
+        samples if samples.is_depth() => PictureKind::Depth,
+        samples if samples.has_color() => PictureKind::Color,
+        _ => PictureKind::Grey,
     };
     Ok((size, kind))
 }
 
 /// Decodes to 8-bit RGB: grey is repeated, transparency ignored, 16 bits are rounded to 8. With `expected`, a picture
 /// of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
-pub(super) fn color(
+pub(super) fn read_color(
     path: &Path,
     expected: Option<(u32, u32)>,
     scratch: &mut Scratch,
     into: &mut ColorImage,
-) -> Result<Extras, PictureFault> {
-    let coded = Coded::open(path, &mut scratch.file)?;
+) -> Result<PhotoMetadata, PictureFault> {
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let (found, samples) = (coded.size(), coded.samples());
     if let Some(expected) = expected.filter(|&expected| expected != found) {
         return Err(PictureFault::Size { found, expected });
     }
     into.resize(found.0, found.1);
-    if samples == (Samples { channels: 3, are_wide: false }) {
+    if samples == (SampleFormat { channels: 3, is_16bit: false }) {
         return coded.decode_rgb(&mut scratch.pixels, &mut into.rgb);
     }
     let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
     coded.decode_runs(&mut scratch.pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            *rgb = channels.map(|channel| match samples.are_wide {
+            *rgb = channels.map(|channel| match samples.is_16bit {
                 true => ((u32::from(sample_u16(pixel, channel)) * 255 + 32767) / 65535) as u8,
                 false => pixel[channel],
             });
@@ -94,7 +94,7 @@ fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
 
 /// Decodes a right picture to luma, from RGB as for the left one. A picture whose size differs from `left` is rejected
 /// before it is decoded.
-pub(super) fn right_luma(
+pub(super) fn read_right_luma(
     path: &Path,
     left: (u32, u32),
     scratch: &mut Scratch,
@@ -102,7 +102,7 @@ pub(super) fn right_luma(
 ) -> Result<(), PictureFault> {
     // Moved out, as `color` needs the rest of the scratch memory.
     let mut right = std::mem::take(&mut scratch.right);
-    let decoded = color(path, Some(left), scratch, &mut right);
+    let decoded = read_color(path, Some(left), scratch, &mut right);
     if decoded.is_ok() {
         into.set_luma_from(&right);
     }
@@ -114,14 +114,14 @@ pub(super) fn right_luma(
 }
 
 /// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a picture is rejected.
-pub(super) fn depth(
+pub(super) fn read_depth(
     path: &Path,
     units: DepthUnits,
     color_size: Option<(u32, u32)>,
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
-    let coded = Coded::open(path, &mut scratch.file)?;
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let samples = coded.samples();
     if !samples.is_depth() {
         return Err(match (samples.has_color(), samples.has_alpha()) {
@@ -142,7 +142,7 @@ pub(super) fn depth(
             arch.dispatch(ConvertToMetres { values, units, metres });
         } else {
             let pixels = metres.iter_mut().step_by(run.step).zip(values);
-            pixels.for_each(|(metres, value)| *metres = units.metres(*value));
+            pixels.for_each(|(metres, value)| *metres = units.to_metres(*value));
         }
     })?;
     Ok(())
@@ -151,7 +151,7 @@ pub(super) fn depth(
 impl DepthUnits {
     /// Converts a big-endian value to metres; 0 if it is unknown.
     #[inline(always)]
-    fn metres(self, value: [u8; 2]) -> f32 {
+    fn to_metres(self, value: [u8; 2]) -> f32 {
         // 0 is unknown in any case.
         let (value, invalid) = (u16::from_be_bytes(value), self.invalid.unwrap_or(0));
         let depth_m = f32::from(value) / self.scale;
@@ -172,21 +172,21 @@ impl WithSimd for ConvertToMetres<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { values, units, metres } = self;
         for (metres, &value) in metres.iter_mut().zip(values) {
-            *metres = units.metres(value);
+            *metres = units.to_metres(value);
         }
     }
 }
 
 /// Decodes relative inverse depth (8 or 16 bits, grey, or RGB with grey content) to distances relative to the nearest
 /// one. A map that does not cover a picture of `color` pixels is rejected.
-pub(super) fn inverse_depth(
+pub(super) fn read_inverse_depth(
     path: &Path,
     white_is_far: bool,
     color: (u32, u32),
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
-    let coded = Coded::open(path, &mut scratch.file)?;
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let found = coded.size();
     if !depth_covers(found, color) {
         return Err(PictureFault::DepthSize { found, color });
@@ -201,21 +201,21 @@ pub(super) fn inverse_depth(
 
 /// Decodes to width, height and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
 /// by alpha if there is one.
-pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
+pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
     let mut scratch = Scratch::default();
-    let coded = Coded::open(path, &mut scratch.file)?;
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let (width, height) = coded.size();
     let mut grey = vec![0.0; width as usize * height as usize];
     decode_grey(coded, &mut scratch.pixels, &mut grey)?;
     Ok((width, height, grey))
 }
 
-fn decode_grey(coded: Coded, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
+fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
     let samples = coded.samples();
     coded.decode_runs(pixels, |run, row| {
         let pixels = grey[run.first..].iter_mut().step_by(run.step);
         for (grey, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            let sample = |channel: usize| match samples.are_wide {
+            let sample = |channel: usize| match samples.is_16bit {
                 true => f32::from(sample_u16(pixel, channel)) / 65535.0,
                 false => f32::from(pixel[channel]) / 255.0,
             };

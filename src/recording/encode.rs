@@ -6,8 +6,8 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
 use png::text_metadata::ITXtChunk;
 
-use super::extras::Extras;
-use super::unit::{self, DISPARITY_SCALE, Meaning};
+use super::photo_metadata::PhotoMetadata;
+use super::unit::{self, DISPARITY_SCALE, MapUnit};
 use super::{jpeg, xmp};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
@@ -15,40 +15,44 @@ use crate::frame::{ColorImage, DepthMap, DisparityMap};
 const JPEG_QUALITY: u8 = 95;
 
 /// Compresses as well as a filter chosen per row, in half the time (measured on 640x480 colour and depth).
-const FILTER: png::Filter = png::Filter::Paeth;
+const PNG_FILTER: png::Filter = png::Filter::Paeth;
 
 /// Appends `image` to `file` as PNG, with a fast compression that keeps up with a camera.
-pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
-    photo_png(image, &Extras::default(), file)
+pub(super) fn encode_color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
+    encode_photo_png(image, &PhotoMetadata::default(), file)
 }
 
 /// Appends `image` to `file` as PNG, with its colour profile, EXIF and XMP.
-pub(super) fn photo_png(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
+pub(super) fn encode_photo_png(
+    image: &ColorImage,
+    metadata: &PhotoMetadata,
+    file: &mut Vec<u8>,
+) -> Result<(), png::EncodingError> {
     let mut info = png::Info::with_size(image.width, image.height);
-    info.icc_profile = extras.icc_profile.as_deref().map(Cow::Borrowed);
-    info.exif_metadata = extras.exif.as_deref().map(Cow::Borrowed);
-    info.utf8_text.extend(extras.xmp.as_ref().map(|packet| ITXtChunk::new(xmp::PNG_KEYWORD, packet)));
+    info.icc_profile = metadata.icc_profile.as_deref().map(Cow::Borrowed);
+    info.exif_metadata = metadata.exif.as_deref().map(Cow::Borrowed);
+    info.utf8_text.extend(metadata.xmp.as_ref().map(|packet| ITXtChunk::new(xmp::PNG_KEYWORD, packet)));
     let mut encoder = png::Encoder::with_info(file, info)?;
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
-    encoder.set_filter(FILTER);
+    encoder.set_filter(PNG_FILTER);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&image.rgb)?;
     writer.finish()
 }
 
 /// Appends `image` to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP.
-pub(super) fn photo_jpeg(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
+pub(super) fn encode_photo_jpeg(image: &ColorImage, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
     let mut encoder = JpegEncoder::new_with_quality(&mut *file, JPEG_QUALITY);
-    if let Some(profile) = &extras.icc_profile {
+    if let Some(profile) = &metadata.icc_profile {
         encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
     }
-    if let Some(exif) = &extras.exif {
+    if let Some(exif) = &metadata.exif {
         encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
     }
     encoder.write_image(&image.rgb, image.width, image.height, ExtendedColorType::Rgb8)?;
-    if let Some(packet) = &extras.xmp {
+    if let Some(packet) = &metadata.xmp {
         jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }
     Ok(())
@@ -56,32 +60,32 @@ pub(super) fn photo_jpeg(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>
 
 /// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre, with `meaning` as a text chunk if
 /// given; `units` is working memory.
-pub(super) fn depth_png(
+pub(super) fn encode_depth_png(
     depth: &DepthMap,
     depth_scale: f32,
-    meaning: Option<Meaning>,
+    map_unit: Option<MapUnit>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
-    png_16bit(depth.size(), &depth.metres, depth_scale, meaning, units, file)
+    encode_png_16bit(depth.size(), &depth.metres, depth_scale, map_unit, units, file)
 }
 
 /// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel, with `meaning` as a text
 /// chunk.
-pub(super) fn disparity_png(
+pub(super) fn encode_disparity_png(
     disparity: &DisparityMap,
-    meaning: Meaning,
+    map_unit: MapUnit,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
-    png_16bit(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(meaning), &mut Vec::new(), file)
+    encode_png_16bit(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(map_unit), &mut Vec::new(), file)
 }
 
 /// Appends `values` (`height` x `width`, row-major) to `file` as 16-bit grey PNG of `scale` units per 1.0, 0 = unknown.
-fn png_16bit(
+fn encode_png_16bit(
     (width, height): (u32, u32),
     values: &[f32],
     scale: f32,
-    meaning: Option<Meaning>,
+    map_unit: Option<MapUnit>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
@@ -91,9 +95,9 @@ fn png_16bit(
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
     encoder.set_compression(png::Compression::Fast);
-    encoder.set_filter(FILTER);
-    if let Some(meaning) = meaning {
-        encoder.add_text_chunk(unit::KEYWORD.to_owned(), meaning.text())?;
+    encoder.set_filter(PNG_FILTER);
+    if let Some(map_unit) = map_unit {
+        encoder.add_text_chunk(unit::KEYWORD.to_owned(), map_unit.text())?;
     }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(units)?;
@@ -104,14 +108,14 @@ fn png_16bit(
 /// a known value below one unit stays known.
 fn quantize(value: f32, scale: f32) -> u16 {
     let units = (value * scale).round();
-    if DepthMap::is_known(value) && value <= largest(scale) { units.clamp(1.0, MAX_UNITS) as u16 } else { 0 }
+    if DepthMap::is_known(value) && value <= max_value(scale) { units.clamp(1.0, MAX_SAMPLE) as u16 } else { 0 }
 }
 
-const MAX_UNITS: f32 = u16::MAX as f32;
+const MAX_SAMPLE: f32 = u16::MAX as f32;
 
 /// Returns the largest value that can be written at `scale` units per 1.0: it still rounds to 65535.
-pub(super) fn largest(scale: f32) -> f32 {
-    (MAX_UNITS + 0.499) / scale
+pub(super) fn max_value(scale: f32) -> f32 {
+    (MAX_SAMPLE + 0.499) / scale
 }
 
 #[cfg(test)]

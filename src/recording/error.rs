@@ -13,13 +13,13 @@ use crate::files::folder::FolderError;
 pub enum RecordingError {
     /// The folder contains no list of a known layout.
     #[error(
-        "{}: not a recording: looked for {looked_for}, and found none of these; give the folder that contains \
+        "{}: not a recording: looked for {expected_files}, and found none of these; give the folder that contains \
          them", dir.display()
     )]
     NotARecording {
         dir: PathBuf,
         /// The files that identify a recording.
-        looked_for: String,
+        expected_files: String,
     },
     /// A list that the layout needs is missing.
     #[error("{}: the list {missing} is missing beside {present}; restore it (lines of `time file`)", dir.display())]
@@ -111,7 +111,7 @@ pub enum RecordingError {
         "{}: no picture of the right camera lies within {} ms of one of the left; are the lists of one recording?",
         dir.display(), *tolerance_ns as f64 / 1e6
     )]
-    NoEyePairs {
+    NoStereoPairs {
         dir: PathBuf,
         /// Largest time difference of a pair.
         tolerance_ns: u64,

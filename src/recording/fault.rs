@@ -108,12 +108,12 @@ pub enum PictureFault {
     #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
     TooLarge { width: u32, height: u32 },
     /// The file is larger than any supported picture.
-    #[error("the file has {bytes} bytes, and at most {most_bytes} are read; convert it")]
+    #[error("the file has {bytes} bytes, and at most {max_bytes} are read; convert it")]
     FileSize {
         /// Size of the file.
         bytes: u64,
         /// The maximum size.
-        most_bytes: u64,
+        max_bytes: u64,
     },
     /// The picture has no pixels.
     #[error("the picture has no pixel ({width}x{height}); export it again")]

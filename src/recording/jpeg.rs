@@ -3,7 +3,7 @@
 use std::io::{BufReader, ErrorKind, Read, Seek};
 
 use super::fault::PictureFault;
-use super::samples::Samples;
+use super::samples::SampleFormat;
 
 /// Maximum number of segments before the frame header; cameras write some tens.
 const MAX_SEGMENTS: usize = 1000;
@@ -13,7 +13,7 @@ const MAX_STRAY_BYTES: usize = 1 << 16;
 
 /// Reads size (columns, rows) and samples from the frame header (SOF segment) of a JPEG without decoding pixels. `file`
 /// must be at its start.
-pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
+pub(super) fn read_header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), SampleFormat), PictureFault> {
     fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
         let mut bytes = [0; N];
         file.read_exact(&mut bytes).map_err(|error| match error.kind() {
@@ -43,7 +43,7 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
                 let size = [[x, x_low], [y, y_low]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
                 // CMYK is decoded to RGB.
                 let channels = if components == 1 { 1 } else { 3 };
-                return Ok((size.into(), Samples { channels, are_wide: false }));
+                return Ok((size.into(), SampleFormat { channels, is_16bit: false }));
             }
             // EOI or SOS.
             0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),

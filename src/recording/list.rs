@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
 
-use super::contents::{Place, Source};
+use super::contents::{ListPosition, PictureSource};
 use super::error::RecordingError;
 use super::fault::LineFault;
 use super::timeline::MAX_LENGTH_NS;
@@ -20,36 +20,40 @@ const QUOTED_CHARS: usize = 40;
 pub(super) struct Entry {
     /// In nanoseconds; `None` if unknown or invalid. If a line states an invalid one, `source` has the fault.
     pub(super) time_ns: Option<u64>,
-    pub(super) source: Source,
+    pub(super) source: PictureSource,
 }
 
 impl Entry {
     /// Creates the entry of a line. A fault of the time replaces the file, because it is reported when the file is
     /// read.
-    pub(super) fn new(place: Place, time_ns: Result<u64, LineFault>, file: Result<PathBuf, LineFault>) -> Self {
+    pub(super) fn new(
+        position: ListPosition,
+        time_ns: Result<u64, LineFault>,
+        file: Result<PathBuf, LineFault>,
+    ) -> Self {
         match time_ns {
-            Ok(time_ns) => Self { time_ns: Some(time_ns), source: Source { place: Some(place), file } },
-            Err(fault) => Self { time_ns: None, source: Source { place: Some(place), file: Err(fault) } },
+            Ok(time_ns) => Self { time_ns: Some(time_ns), source: PictureSource { position: Some(position), file } },
+            Err(fault) => Self { time_ns: None, source: PictureSource { position: Some(position), file: Err(fault) } },
         }
     }
 }
 
-/// Reads the list `list` in `dir`; `parse` converts the place and text of a line to an entry.
+/// Reads the list `list` in `dir`; `parse` converts the position and text of a line to an entry.
 ///
 /// # Errors
 /// The list is unreadable, empty, or has more than [`MAX_ENTRIES`] lines.
-pub(super) fn read<T>(
+pub(super) fn read_list<T>(
     dir: &Path,
     list: &'static str,
-    parse: impl Fn(Place, Result<&str, LineFault>) -> T,
+    parse: impl Fn(ListPosition, Result<&str, LineFault>) -> T,
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
     let bytes = input::read(&path, input::MAX_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
     // Count before parsing: an entry takes far more memory than its line.
-    if lines(&bytes).nth(MAX_ENTRIES).is_some() {
+    if split_lines(&bytes).nth(MAX_ENTRIES).is_some() {
         return Err(RecordingError::LongList { list: path, most: MAX_ENTRIES });
     }
-    let entries: Vec<T> = lines(&bytes).map(|(line, text)| parse(Place { list, line }, text)).collect();
+    let entries: Vec<T> = split_lines(&bytes).map(|(line, text)| parse(ListPosition { list, line }, text)).collect();
     if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
 }
 
@@ -69,7 +73,7 @@ pub(super) fn clear_unordered_times<'a>(entries: impl Iterator<Item = &'a mut En
     let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
     let is_kept = longest_increasing(&times);
     let kept: Vec<_> = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept).map(|(&time, _)| time).collect();
-    let range = busiest_range(&kept);
+    let range = densest_range(&kept);
     for (entry, is_kept) in entries.into_iter().zip(is_kept) {
         if is_kept && entry.time_ns.is_some_and(|time| range.contains(&time)) {
             continue;
@@ -85,7 +89,7 @@ pub(super) fn clear_unordered_times<'a>(entries: impl Iterator<Item = &'a mut En
 }
 
 /// Returns the range of length [`MAX_LENGTH_NS`] with the most of some increasing times; the first of several.
-fn busiest_range(times: &[u64]) -> RangeInclusive<u64> {
+fn densest_range(times: &[u64]) -> RangeInclusive<u64> {
     let range_from = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MAX_LENGTH_NS);
     let count = |range: &RangeInclusive<u64>| {
         times.partition_point(|time| time <= range.end()) - times.partition_point(|time| time < range.start())
@@ -118,7 +122,7 @@ fn longest_increasing(times: &[u64]) -> Vec<bool> {
 }
 
 /// Returns number (from 1) and text of the lines that are neither blank nor comments.
-pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
+pub(super) fn split_lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
     // Some editors write a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
@@ -128,16 +132,16 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, Lin
 }
 
 /// Checks that a file name stays within its folder, by its text only: links are resolved when it is opened.
-pub(super) fn inside(file: &str) -> Result<PathBuf, LineFault> {
+pub(super) fn parse_relative_path(file: &str) -> Result<PathBuf, LineFault> {
     if file.contains(char::is_control) {
-        return Err(LineFault::FileName(quoted(file)));
+        return Err(LineFault::FileName(quote(file)));
     }
     let path = PathBuf::from(file);
     let is_inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if is_inside { Ok(path) } else { Err(LineFault::Outside(path)) }
 }
 
-pub(super) fn quoted(text: &str) -> String {
+pub(super) fn quote(text: &str) -> String {
     text.chars().take(QUOTED_CHARS).collect()
 }
 
@@ -160,11 +164,11 @@ mod tests {
 
     #[test]
     fn a_date_of_another_age_costs_only_itself() {
-        assert_eq!(busiest_range(&[]), 0..=0);
-        assert_eq!(busiest_range(&[7, 8]), 7..=7 + MAX_LENGTH_NS);
+        assert_eq!(densest_range(&[]), 0..=0);
+        assert_eq!(densest_range(&[7, 8]), 7..=7 + MAX_LENGTH_NS);
         let now_ns = 5 * MAX_LENGTH_NS;
-        assert_eq!(busiest_range(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MAX_LENGTH_NS);
-        assert_eq!(busiest_range(&[0, u64::MAX]), 0..=MAX_LENGTH_NS);
+        assert_eq!(densest_range(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MAX_LENGTH_NS);
+        assert_eq!(densest_range(&[0, u64::MAX]), 0..=MAX_LENGTH_NS);
     }
 
     #[test]
@@ -176,11 +180,11 @@ mod tests {
     #[test]
     fn names_stay_inside() {
         for name in ["rgb/1.png", "1.png", "./rgb/1.png", "rgb/..1.png"] {
-            assert_eq!(inside(name), Ok(PathBuf::from(name)));
+            assert_eq!(parse_relative_path(name), Ok(PathBuf::from(name)));
         }
         for name in ["../1.png", "rgb/../../1.png", "/somewhere/1.png", "rgb/..", ".."] {
-            assert_eq!(inside(name), Err(LineFault::Outside(PathBuf::from(name))));
+            assert_eq!(parse_relative_path(name), Err(LineFault::Outside(PathBuf::from(name))));
         }
-        assert!(matches!(inside("rgb/\u{1b}[2J.png"), Err(LineFault::FileName(_))));
+        assert!(matches!(parse_relative_path("rgb/\u{1b}[2J.png"), Err(LineFault::FileName(_))));
     }
 }

@@ -15,7 +15,6 @@ mod decode;
 mod encode;
 mod error;
 mod euroc;
-mod extras;
 mod fault;
 mod jpeg;
 mod kitti;
@@ -23,6 +22,7 @@ mod list;
 mod middlebury;
 mod pair;
 mod pfm;
+mod photo_metadata;
 mod samples;
 mod timeline;
 mod unit;
@@ -33,13 +33,13 @@ use std::path::Path;
 
 pub use decode::Scratch;
 pub use error::RecordingError;
-pub use extras::Extras;
 pub use fault::{GeometryFault, LineFault, PictureFault};
+pub use photo_metadata::PhotoMetadata;
 
 use crate::calibration::StereoCalibration;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::optics::StereoRig;
-use contents::{DepthForm, Folder, Layout, Locator, Source};
+use contents::{DepthFormat, Layout, Locator, PictureSource, RecordingFolder};
 
 /// The supported layouts, in order of detection.
 const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
@@ -103,13 +103,13 @@ pub struct Unpaired {
 
 /// The stereo geometry of a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Pair {
+pub enum StereoGeometry {
     /// The pictures are rectified, with this geometry.
     Rectified(StereoRig),
     /// The pictures are not rectified; this calibration allows it.
     Raw(Box<StereoCalibration>),
     /// The recording has no calibration.
-    Unstated,
+    Uncalibrated,
 }
 
 /// An opened recording: its lists are in memory (about 300 bytes per frame), its pictures are read on request, into
@@ -120,13 +120,13 @@ pub enum Pair {
 #[derive(Debug)]
 pub struct Recording {
     layout: &'static str,
-    folder: Folder,
+    folder: RecordingFolder,
     frames: Vec<Frame>,
     size: (u32, u32),
     period_ns: u64,
-    depth: Option<DepthForm>,
-    pair: Option<Pair>,
-    disparities: Option<u32>,
+    depth: Option<DepthFormat>,
+    stereo_geometry: Option<StereoGeometry>,
+    disparity_count: Option<u32>,
     unpaired: Unpaired,
 }
 
@@ -134,9 +134,9 @@ pub struct Recording {
 #[derive(Debug)]
 struct Frame {
     time_ns: u64,
-    color: Source,
-    right: Option<Source>,
-    depth: Option<Source>,
+    color: PictureSource,
+    right: Option<PictureSource>,
+    depth: Option<PictureSource>,
 }
 
 impl Recording {
@@ -149,14 +149,15 @@ impl Recording {
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
-        let folder = Folder { dir: dir.to_owned(), root };
-        let not_a_recording = || RecordingError::NotARecording { dir: dir.to_owned(), looked_for: looked_for() };
-        let layout = LAYOUTS.iter().find(|layout| (layout.is_in)(dir)).ok_or_else(not_a_recording)?;
+        let folder = RecordingFolder { dir: dir.to_owned(), root };
+        let not_a_recording =
+            || RecordingError::NotARecording { dir: dir.to_owned(), expected_files: describe_expected_files() };
+        let layout = LAYOUTS.iter().find(|layout| (layout.matches_folder)(dir)).ok_or_else(not_a_recording)?;
         let contents = (layout.open)(&folder, options)?;
 
-        let size = first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
+        let size = read_first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
-        let listed = contents.frames.into_iter().zip(timeline::fill(&times_ns));
+        let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
         let frames: Vec<_> = listed
             .map(|(frame, time_ns)| Frame { time_ns, color: frame.color, right: frame.right, depth: frame.depth })
             .collect();
@@ -167,8 +168,8 @@ impl Recording {
             period_ns: timeline::median_period_ns(frames.iter().map(|frame| frame.time_ns)),
             frames,
             depth: contents.depth,
-            pair: contents.pair,
-            disparities: contents.disparities,
+            stereo_geometry: contents.stereo_geometry,
+            disparity_count: contents.disparity_count,
             unpaired: contents.unpaired,
         })
     }
@@ -209,12 +210,12 @@ impl Recording {
 
     /// Returns whether its depth is only relative.
     pub fn has_relative_depth(&self) -> bool {
-        matches!(self.depth, Some(DepthForm::Inverse { .. }))
+        matches!(self.depth, Some(DepthFormat::Inverse { .. }))
     }
 
     /// Returns whether its depth is in the units of [`Options::depth_scale`].
     pub fn has_depth_in_units(&self) -> bool {
-        matches!(self.depth, Some(DepthForm::Units(_)))
+        matches!(self.depth, Some(DepthFormat::Units(_)))
     }
 
     /// Returns whether the frames have depth.
@@ -223,13 +224,13 @@ impl Recording {
     }
 
     /// Returns the stereo geometry, if the frames have right pictures.
-    pub fn pair(&self) -> Option<&Pair> {
-        self.pair.as_ref()
+    pub fn stereo_geometry(&self) -> Option<&StereoGeometry> {
+        self.stereo_geometry.as_ref()
     }
 
     /// Returns the number of disparities to search, from 0, if the recording states it: a multiple of 16.
-    pub fn disparities(&self) -> Option<u32> {
-        self.disparities
+    pub fn disparity_count(&self) -> Option<u32> {
+        self.disparity_count
     }
 
     /// Returns the counts of listed pictures without a frame.
@@ -245,7 +246,7 @@ impl Recording {
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
         let path = self.folder.locate(source)?;
-        decode::color(&path, Some(self.size), scratch, into)
+        decode::read_color(&path, Some(self.size), scratch, into)
             .map(drop)
             .map_err(|fault| source.error(&self.folder.dir, fault))
     }
@@ -263,11 +264,11 @@ impl Recording {
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
         let read = match form {
-            DepthForm::Units(units) => decode::depth(&path, *units, Some(self.size), scratch, into),
-            DepthForm::Inverse { white_is_far } => {
-                decode::inverse_depth(&path, *white_is_far, self.size, scratch, into)
+            DepthFormat::Units(units) => decode::read_depth(&path, *units, Some(self.size), scratch, into),
+            DepthFormat::Inverse { white_is_far } => {
+                decode::read_inverse_depth(&path, *white_is_far, self.size, scratch, into)
             }
-            DepthForm::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
+            DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
         };
         read.map_err(|fault| source.error(&self.folder.dir, fault))
     }
@@ -277,13 +278,13 @@ impl Recording {
     /// # Errors
     /// Same as for [`Recording::read_color`]; or the recording has one camera only.
     pub fn read_right(&self, index: usize, scratch: &mut Scratch, into: &mut GrayImage) -> Result<(), RecordingError> {
-        let one_eye = || RecordingError::NoRight { dir: self.folder.dir.clone() };
+        let no_right_picture = || RecordingError::NoRight { dir: self.folder.dir.clone() };
         let frame = self.frame(index)?;
-        self.pair.as_ref().ok_or_else(one_eye)?;
+        self.stereo_geometry.as_ref().ok_or_else(no_right_picture)?;
         // Without a right picture, the line of the left one is at fault.
         let source = frame.right.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
-        decode::right_luma(&path, self.size, scratch, into).map_err(|fault| source.error(&self.folder.dir, fault))
+        decode::read_right_luma(&path, self.size, scratch, into).map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
     fn frame(&self, index: usize) -> Result<&Frame, RecordingError> {
@@ -292,12 +293,15 @@ impl Recording {
 }
 
 /// Returns the files that identify each layout, for messages.
-fn looked_for() -> String {
-    LAYOUTS.map(|layout| format!("{} ({})", layout.looked_for, layout.name)).join(", ")
+fn describe_expected_files() -> String {
+    LAYOUTS.map(|layout| format!("{} ({})", layout.expected_files, layout.name)).join(", ")
 }
 
 /// Returns the size of the first colour picture with a readable header, or else the error of the first one.
-fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> Result<(u32, u32), RecordingError> {
+fn read_first_size<'a>(
+    folder: &RecordingFolder,
+    colors: impl Iterator<Item = &'a PictureSource>,
+) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name an unreadable file many times: open it once.
     let mut unreadable = HashSet::new();
@@ -306,7 +310,7 @@ fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> 
             if unreadable.contains(&path) {
                 return Ok(None);
             }
-            let header = decode::header(&path).map_err(|fault| source.error(&folder.dir, fault));
+            let header = decode::read_header(&path).map_err(|fault| source.error(&folder.dir, fault));
             unreadable.insert(path);
             header.map(|(size, _)| Some(size))
         });

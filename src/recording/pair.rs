@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::contents::Source;
+use super::contents::PictureSource;
 use super::list::Entry;
 
 /// The list of a time, and its index there.
@@ -16,11 +16,11 @@ enum Stream {
 /// Entries with their counterparts.
 pub(super) struct Paired {
     /// Pairs, and entries without a time, which stay as frames that fail to read.
-    pub(super) frames: Vec<(Entry, Option<Source>)>,
+    pub(super) frames: Vec<(Entry, Option<PictureSource>)>,
     /// Number of unpaired entries of the first list.
-    pub(super) left_over: usize,
+    pub(super) unpaired: usize,
     /// Number of unpaired entries of the second list.
-    pub(super) others_left_over: usize,
+    pub(super) unpaired_others: usize,
 }
 
 /// Pairs two lists with [`pair_nearest`]. Entries with a time but no counterpart are counted and dropped.
@@ -28,7 +28,7 @@ pub(super) fn pair_by_time(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns
     let times = |entries: &[Entry]| entries.iter().filter_map(|entry| entry.time_ns).collect::<Vec<_>>();
     let mut partners = pair_nearest(&times(&entries), &times(&others), tolerance_ns).into_iter();
 
-    let mut paired = Paired { frames: Vec::new(), left_over: 0, others_left_over: others.len() };
+    let mut paired = Paired { frames: Vec::new(), unpaired: 0, unpaired_others: others.len() };
     // `pair_nearest` sees only entries with a time.
     let mut timed: Vec<_> =
         others.into_iter().filter(|other| other.time_ns.is_some()).map(|other| Some(other.source)).collect();
@@ -38,9 +38,9 @@ pub(super) fn pair_by_time(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns
             None => None,
         };
         if entry.time_ns.is_some() && partner.is_none() {
-            paired.left_over += 1;
+            paired.unpaired += 1;
         } else {
-            paired.others_left_over -= usize::from(partner.is_some());
+            paired.unpaired_others -= usize::from(partner.is_some());
             paired.frames.push((entry, partner));
         }
     }

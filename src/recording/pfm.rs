@@ -7,21 +7,21 @@ use super::coded::check_size;
 use super::decode::Scratch;
 use super::depth_covers;
 use super::fault::PictureFault;
-use super::unit::Meaning;
+use super::unit::MapUnit;
 use crate::frame::DepthMap;
 use crate::optics::StereoRig;
 
 /// Returns whether the file name has the extension `.pfm`.
-pub(super) fn is_named(path: &Path) -> bool {
+pub(super) fn is_pfm_path(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
 /// Reads the values as stored, with 0 for unknown, and their meaning if the file states it.
-pub(super) fn read(path: &Path) -> Result<(DepthMap, Option<Meaning>), PictureFault> {
+pub(super) fn read_pfm(path: &Path) -> Result<(DepthMap, Option<MapUnit>), PictureFault> {
     let mut map = DepthMap::default();
-    let ((width, height), meaning) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
+    let ((width, height), map_unit) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
     (map.width, map.height) = (width, height);
-    Ok((map, meaning))
+    Ok((map, map_unit))
 }
 
 /// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` (columns, rows) pixels,
@@ -48,9 +48,9 @@ pub(super) fn read_disparity_as_depth(
 
 /// Parses a PFM into `values`, top row first, with 0 for unknown. Returns width and height, and the meaning if the file
 /// states it.
-fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Meaning>), PictureFault> {
+fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<MapUnit>), PictureFault> {
     let mut rest = bytes;
-    let magic = word(&mut rest)?;
+    let magic = parse_word(&mut rest)?;
     if magic != "Pf" {
         return Err(if magic == "PF" {
             PictureFault::NotDepth("a colour PFM")
@@ -58,12 +58,12 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
             PictureFault::Format("grey PFM")
         });
     }
-    let width = number(word(&mut rest)?)?;
-    let height = number(word(&mut rest)?)?;
+    let width = parse_number(parse_word(&mut rest)?)?;
+    let height = parse_number(parse_word(&mut rest)?)?;
     check_size(width, height)?;
     // Only the sign is used: negative is little-endian.
-    let scale_text = word(&mut rest)?;
-    let scale: f32 = number(scale_text)?;
+    let scale_text = parse_word(&mut rest)?;
+    let scale: f32 = parse_number(scale_text)?;
     let row_bytes = width as usize * 4;
     let data = rest.get(..row_bytes * height as usize).ok_or(PictureFault::Truncated)?;
 
@@ -72,11 +72,11 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
     let read = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
     values.clear();
     values.extend(read.map(|value| if DepthMap::is_known(value) { value } else { 0.0 }));
-    Ok(((width, height), Meaning::of_pfm_scale(scale_text)))
+    Ok(((width, height), MapUnit::from_pfm_scale(scale_text)))
 }
 
 /// Reads the next word of the header. Exactly one white space ends it, since pixels may follow.
-fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
+fn parse_word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
     let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(PictureFault::Truncated)?;
     let length = rest[start..].iter().position(u8::is_ascii_whitespace).ok_or(PictureFault::Truncated)?;
     let word = &rest[start..start + length];
@@ -84,15 +84,15 @@ fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
     std::str::from_utf8(word).map_err(|_| PictureFault::Damaged("its header is not text".into()))
 }
 
-fn number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
+fn parse_number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
     let short: String = word.chars().take(20).collect();
     word.parse().map_err(|_| PictureFault::Damaged(format!("{short:?} in its header is not a number")))
 }
 
 /// Appends `values` (`height` x `width`, row-major) to `file` as a little-endian PFM that states their `meaning`.
-pub(super) fn write(width: u32, height: u32, values: &[f32], meaning: Meaning, file: &mut Vec<u8>) {
+pub(super) fn encode_pfm(width: u32, height: u32, values: &[f32], map_unit: MapUnit, file: &mut Vec<u8>) {
     // Writing to memory cannot fail.
-    let _ = write!(file, "Pf\n{width} {height}\n{}\n", meaning.pfm_scale());
+    let _ = write!(file, "Pf\n{width} {height}\n{}\n", map_unit.pfm_scale());
     for row in values.chunks_exact(width.max(1) as usize).rev() {
         file.extend(row.iter().flat_map(|value| value.to_le_bytes()));
     }

@@ -2,14 +2,14 @@
 
 /// Channels and bit depth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Samples {
+pub struct SampleFormat {
     /// 1 is grey, 3 is colour; one more is alpha.
     pub channels: usize,
     /// Whether samples have 16 bits, big-endian, instead of 8.
-    pub are_wide: bool,
+    pub is_16bit: bool,
 }
 
-impl Samples {
+impl SampleFormat {
     pub fn has_color(self) -> bool {
         self.channels >= 3
     }
@@ -19,10 +19,10 @@ impl Samples {
     }
 
     pub fn is_depth(self) -> bool {
-        self.are_wide && self.channels == 1
+        self.is_16bit && self.channels == 1
     }
 
     pub fn bytes_per_pixel(self) -> usize {
-        self.channels * (1 + usize::from(self.are_wide))
+        self.channels * (1 + usize::from(self.is_16bit))
     }
 }

@@ -11,7 +11,7 @@ use super::coded;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::still::{write_color, write_depth};
-use crate::files::whole;
+use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap};
 
 /// The keyword of the PNG text with the settings.
@@ -58,7 +58,7 @@ pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, Reco
 
 /// Writes the picture and its input files, or none of them.
 fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingError> {
-    let (color, depth) = sources(path);
+    let (color, depth) = source_paths(path);
     if let Some(taken) = [path, &color, &depth].into_iter().find(|path| path.symlink_metadata().is_ok()) {
         return Err(RecordingError::Exists { path: taken.to_owned() });
     }
@@ -70,7 +70,7 @@ fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingEr
         map.map_or(Ok(()), |map| write_depth(&depth, map, 1.0, false).map(|()| written_files.push(&depth)))
     });
     let written = sources_written.and_then(|()| {
-        whole::write(path, png, false).map_err(|error| match error.kind() {
+        atomic_file::write(path, png, false).map_err(|error| match error.kind() {
             ErrorKind::AlreadyExists => RecordingError::Exists { path: path.to_owned() },
             _ => RecordingError::io("write", path)(error),
         })
@@ -87,7 +87,7 @@ const COLOR: &str = "-color.png";
 const DEPTH: &str = "-depth.pfm";
 
 /// Returns the paths of a snapshot's input files: the picture before the blur, and its depth. They need not exist.
-pub fn sources(path: &Path) -> (PathBuf, PathBuf) {
+pub fn source_paths(path: &Path) -> (PathBuf, PathBuf) {
     (sibling_path(path, COLOR), sibling_path(path, DEPTH))
 }
 
@@ -101,12 +101,12 @@ fn sibling_path(path: &Path, ending: &str) -> PathBuf {
 ///
 /// # Errors
 /// The file is missing, not a PNG, damaged, or contains no settings.
-pub fn settings(path: &Path) -> Result<Vec<(String, String)>, RecordingError> {
-    read_text(path).and_then(|text| parse(&text)).map_err(RecordingError::picture(path))
+pub fn read_settings(path: &Path) -> Result<Vec<(String, String)>, RecordingError> {
+    read_text(path).and_then(|text| parse_settings(&text)).map_err(RecordingError::picture(path))
 }
 
 /// Parses lines of `--name=value`.
-fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
+fn parse_settings(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     let setting = |line: &str| {
         let (name, value) = line.strip_prefix("--")?.split_once('=')?;
         Some((name.to_owned(), value.to_owned()))
@@ -120,7 +120,7 @@ fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
 
 /// Reads the settings from a PNG as text. Other programs may have rewritten the iTXt chunk as tEXt or zTXt.
 fn read_text(path: &Path) -> Result<String, PictureFault> {
-    let info = coded::png_info(path)?;
+    let info = coded::read_png_info(path)?;
     let fault = coded::png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
         return chunk.get_text().map_err(fault);

@@ -11,11 +11,11 @@ use image::{DynamicImage, ImageBuffer, Luma, RgbImage, imageops};
 
 use super::decode::{self, DepthUnits, Scratch};
 use super::error::RecordingError;
-use super::extras::Extras;
 use super::fault::PictureFault;
-use super::unit::{self, Meaning};
+use super::photo_metadata::PhotoMetadata;
+use super::unit::{self, MapUnit};
 use super::{check_depth_scale, coded, depth_covers, encode, pfm, tum};
-use crate::files::whole;
+use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
 
@@ -32,18 +32,18 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 ///
 /// # Errors
 /// Same as for [`read_color`].
-pub fn read_photo(path: &Path) -> Result<(ColorImage, Extras), RecordingError> {
+pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingError> {
     let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    let read = decode::color(path, None, &mut scratch, &mut image);
-    let mut extras = read.map_err(RecordingError::picture(path))?;
+    let read = decode::read_color(path, None, &mut scratch, &mut image);
+    let mut metadata = read.map_err(RecordingError::picture(path))?;
     drop(scratch);
 
     let (width, height) = image.size();
     let rgb = RgbImage::from_raw(width, height, image.rgb).unwrap_or_default();
     let mut upright = DynamicImage::ImageRgb8(rgb);
-    upright.apply_orientation(extras.take_orientation());
+    upright.apply_orientation(metadata.take_orientation());
     let (width, height) = (upright.width(), upright.height());
-    Ok((ColorImage { width, height, rgb: upright.into_bytes() }, extras))
+    Ok((ColorImage { width, height, rgb: upright.into_bytes() }, metadata))
 }
 
 /// The content of a map file.
@@ -66,33 +66,33 @@ pub enum Map {
 pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> Result<Map, RecordingError> {
     let fault = || RecordingError::picture(path);
     depth_scale.map_or(Ok(()), check_depth_scale)?;
-    let (map, meaning) = if pfm::is_named(path) {
-        pfm::read(path).map_err(fault())?
+    let (map, map_unit) = if pfm::is_pfm_path(path) {
+        pfm::read_pfm(path).map_err(fault())?
     } else {
-        let info = coded::png_info(path).ok();
+        let info = coded::read_png_info(path).ok();
         let text = info.as_ref().and_then(|info| {
             let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == unit::KEYWORD)?;
-            Meaning::of_text(&chunk.text)
+            MapUnit::from_text(&chunk.text)
         });
         let scale = match (depth_scale, text) {
-            (_, Some(Meaning::Disparity { .. })) => unit::DISPARITY_SCALE,
-            (Some(given), Some(Meaning::Depth { per_m })) if given != per_m => {
+            (_, Some(MapUnit::Disparity { .. })) => unit::DISPARITY_SCALE,
+            (Some(given), Some(MapUnit::Depth { per_m })) if given != per_m => {
                 let file = path.display();
                 tracing::warn!("{file}: states {per_m} units per metre, but is read with {given}, as requested");
                 given
             }
             (Some(given), _) => given,
-            (None, Some(Meaning::Depth { per_m })) => per_m,
+            (None, Some(MapUnit::Depth { per_m })) => per_m,
             (None, None) => tum::DEPTH_SCALE,
         };
-        let orientation = info.as_ref().map(|info| Extras::of_png(info).take_orientation());
+        let orientation = info.as_ref().map(|info| PhotoMetadata::from_png(info).take_orientation());
         let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
         let units = DepthUnits { scale, invalid };
-        decode::depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
-        (upright(depth, orientation.unwrap_or(Orientation::NoTransforms)), text)
+        decode::read_depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
+        (apply_orientation(depth, orientation.unwrap_or(Orientation::NoTransforms)), text)
     };
-    Ok(match meaning {
-        Some(Meaning::Disparity { rig }) => {
+    Ok(match map_unit {
+        Some(MapUnit::Disparity { rig }) => {
             Map::Disparity(DisparityMap { width: map.width, height: map.height, px: map.metres }, rig)
         }
         _ => Map::Depth(map),
@@ -122,7 +122,7 @@ pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Resu
 }
 
 /// Rotates a map by its orientation tag.
-fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
+fn apply_orientation(map: DepthMap, orientation: Orientation) -> DepthMap {
     let DepthMap { width, height, metres, .. } = map;
     let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
     let image = match orientation {
@@ -157,7 +157,7 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
 /// Same as for [`read_color`]; or the file is not grey, or does not cover the picture.
 pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) -> Result<DepthMap, RecordingError> {
     let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
-    let read = decode::inverse_depth(path, white_is_far, color, &mut scratch, &mut map);
+    let read = decode::read_inverse_depth(path, white_is_far, color, &mut scratch, &mut map);
     read.map(|()| map).map_err(RecordingError::picture(path))
 }
 
@@ -167,12 +167,12 @@ pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) ->
 /// # Errors
 /// Same as for [`read_depth`].
 pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
-    let map = match pfm::is_named(path) {
-        true => pfm::read(path).map(|(map, _)| map),
+    let map = match pfm::is_pfm_path(path) {
+        true => pfm::read_pfm(path).map(|(map, _)| map),
         false => {
             let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
             let units = DepthUnits { scale: unit::DISPARITY_SCALE, invalid: None };
-            decode::depth(path, units, None, &mut scratch, &mut map).map(|()| map)
+            decode::read_depth(path, units, None, &mut scratch, &mut map).map(|()| map)
         }
     };
     let map = map.map_err(RecordingError::picture(path))?;
@@ -185,7 +185,7 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
 /// # Errors
 /// Same as for [`read_color`].
 pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
-    decode::grey(path).map_err(RecordingError::picture(path))
+    decode::read_grey(path).map_err(RecordingError::picture(path))
 }
 
 /// Reads the picture of an aperture, as [`read_grey`].
@@ -204,18 +204,23 @@ pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError
 /// # Errors
 /// The extension is another one; the file exists and `force` is not set; the file cannot be written.
 pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), RecordingError> {
-    write_photo(path, image, &Extras::default(), force)
+    write_photo(path, image, &PhotoMetadata::default(), force)
 }
 
 /// Does the same as [`write_color`], with metadata.
 ///
 /// # Errors
 /// Same as for [`write_color`].
-pub fn write_photo(path: &Path, image: &ColorImage, extras: &Extras, force: bool) -> Result<(), RecordingError> {
+pub fn write_photo(
+    path: &Path,
+    image: &ColorImage,
+    metadata: &PhotoMetadata,
+    force: bool,
+) -> Result<(), RecordingError> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
-        PhotoFormat::Png => encode::photo_png(image, extras, &mut file).map_err(|error| error.to_string()),
-        PhotoFormat::Jpeg => encode::photo_jpeg(image, extras, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Png => encode::encode_photo_png(image, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Jpeg => encode::encode_photo_jpeg(image, metadata, &mut file).map_err(|error| error.to_string()),
     };
     write(path, encoded, &file, force)
 }
@@ -249,14 +254,14 @@ pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
 /// Same as for [`write_color`]; or the scale is not a number > 0.
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
     check_depth_scale(depth_scale)?;
-    let meaning = Meaning::Depth { per_m: depth_scale };
+    let map_unit = MapUnit::Depth { per_m: depth_scale };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
-            pfm::write(depth.width, depth.height, &depth.metres, meaning, &mut file);
+            pfm::encode_pfm(depth.width, depth.height, &depth.metres, map_unit, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::depth_png(depth, depth_scale, Some(meaning), &mut Vec::new(), &mut file),
+        MapFormat::Png => encode::encode_depth_png(depth, depth_scale, Some(map_unit), &mut Vec::new(), &mut file),
     };
     write(path, encoded, &file, force)
 }
@@ -273,16 +278,16 @@ pub fn write_disparity(
     rig: Option<StereoRig>,
     force: bool,
 ) -> Result<(), RecordingError> {
-    let meaning = Meaning::Disparity { rig };
+    let map_unit = MapUnit::Disparity { rig };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
             let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
             let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
-            pfm::write(disparity.width, disparity.height, &px, meaning, &mut file);
+            pfm::encode_pfm(disparity.width, disparity.height, &px, map_unit, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::disparity_png(disparity, meaning, &mut file),
+        MapFormat::Png => encode::encode_disparity_png(disparity, map_unit, &mut file),
     };
     write(path, encoded, &file, force)
 }
@@ -301,7 +306,7 @@ pub enum MapFormat {
 /// # Errors
 /// The extension is not `.png` or `.pfm`.
 pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
-    if pfm::is_named(path) {
+    if pfm::is_pfm_path(path) {
         Ok(MapFormat::Pfm)
     } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         Ok(MapFormat::Png)
@@ -312,7 +317,7 @@ pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
 
 fn write<E: Display>(path: &Path, encoded: Result<(), E>, file: &[u8], force: bool) -> Result<(), RecordingError> {
     encoded.map_err(|error| RecordingError::picture(path)(PictureFault::Encoding(error.to_string())))?;
-    whole::write(path, file, force).map_err(|error| match error.kind() {
+    atomic_file::write(path, file, force).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists if !force => RecordingError::Exists { path: path.to_owned() },
         _ => RecordingError::io("write", path)(error),
     })

@@ -16,7 +16,7 @@ pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u
 /// Returns a time for every frame in nanoseconds after the first, strictly increasing, hardly beyond [`MAX_LENGTH_NS`].
 /// Unknown times are interpolated between their neighbours, or extrapolated by the period at the ends. The known times
 /// must increase strictly.
-pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
+pub(super) fn interpolate_times(times_ns: &[Option<u64>]) -> Vec<u64> {
     let known: Vec<(usize, u64)> =
         times_ns.iter().enumerate().filter_map(|(index, &time)| Some((index, time?))).collect();
     let period_ns = i128::from(median_period_ns(known.iter().map(|&(_, time)| time)));
@@ -52,22 +52,22 @@ mod tests {
 
     #[test]
     fn known_times_stay_and_the_others_lie_between_them() {
-        assert_eq!(fill(&[Some(50), Some(60), Some(75)]), [0, 10, 25]);
-        assert_eq!(fill(&[Some(100), None, None, Some(130)]), [0, 10, 20, 30]);
+        assert_eq!(interpolate_times(&[Some(50), Some(60), Some(75)]), [0, 10, 25]);
+        assert_eq!(interpolate_times(&[Some(100), None, None, Some(130)]), [0, 10, 20, 30]);
     }
 
     #[test]
     fn the_ends_go_on_at_the_median_period() {
-        assert_eq!(fill(&[None, Some(5), Some(15), Some(25), None, None]), [0, 10, 20, 30, 40, 50]);
-        assert_eq!(fill(&[None, None]), [0, DEFAULT_PERIOD_NS]);
-        assert!(fill(&[]).is_empty());
+        assert_eq!(interpolate_times(&[None, Some(5), Some(15), Some(25), None, None]), [0, 10, 20, 30, 40, 50]);
+        assert_eq!(interpolate_times(&[None, None]), [0, DEFAULT_PERIOD_NS]);
+        assert!(interpolate_times(&[]).is_empty());
     }
 
     #[test]
     fn times_increase_even_where_there_is_no_room() {
-        assert_eq!(fill(&[Some(7), None, None, Some(8), Some(9)]), [0, 1, 2, 3, 4]);
-        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
-        assert_eq!(fill(&[Some(0), Some(MAX_LENGTH_NS), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
+        assert_eq!(interpolate_times(&[Some(7), None, None, Some(8), Some(9)]), [0, 1, 2, 3, 4]);
+        assert_eq!(interpolate_times(&[Some(0), Some(u64::MAX), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
+        assert_eq!(interpolate_times(&[Some(0), Some(MAX_LENGTH_NS), None]), [0, MAX_LENGTH_NS, MAX_LENGTH_NS + 1]);
     }
 
     #[test]

@@ -11,7 +11,7 @@ pub(super) const KEYWORD: &str = "bokehcam map";
 
 /// Quantity and unit of the values in a map file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Meaning {
+pub(super) enum MapUnit {
     Depth {
         /// Units of a PNG per metre, > 0.
         per_m: f32,
@@ -23,7 +23,7 @@ pub(super) enum Meaning {
     },
 }
 
-impl Meaning {
+impl MapUnit {
     /// Returns the text for a PNG. A rig that is only assumed is omitted, as its distances are not real.
     pub(super) fn text(&self) -> String {
         match self {
@@ -37,7 +37,7 @@ impl Meaning {
     }
 
     /// Parses the text of a PNG; `None` if it is not ours, or has invalid values.
-    pub(super) fn of_text(text: &str) -> Option<Self> {
+    pub(super) fn from_text(text: &str) -> Option<Self> {
         let mut words = text.split_ascii_whitespace();
         let kind = words.next()?;
         let value = |name: &str| {
@@ -72,9 +72,9 @@ impl Meaning {
     }
 
     /// Returns the meaning of a PFM by the spelling of its scale; it cannot hold a rig.
-    pub(super) fn of_pfm_scale(scale: &str) -> Option<Self> {
-        let meanings = [Self::Depth { per_m: 1.0 }, Self::Disparity { rig: None }];
-        meanings.into_iter().find(|meaning| meaning.pfm_scale() == scale)
+    pub(super) fn from_pfm_scale(scale: &str) -> Option<Self> {
+        let map_units = [Self::Depth { per_m: 1.0 }, Self::Disparity { rig: None }];
+        map_units.into_iter().find(|map_unit| map_unit.pfm_scale() == scale)
     }
 }
 
@@ -85,16 +85,16 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let rig = StereoRig { focal_px: 707.25, baseline_m: 0.1, doffs_px: -31.086, metric: true };
-        for meaning in
-            [Meaning::Depth { per_m: 5000.0 }, Meaning::Disparity { rig: None }, Meaning::Disparity { rig: Some(rig) }]
+        for map_unit in
+            [MapUnit::Depth { per_m: 5000.0 }, MapUnit::Disparity { rig: None }, MapUnit::Disparity { rig: Some(rig) }]
         {
-            assert_eq!(Meaning::of_text(&meaning.text()), Some(meaning));
-            assert_eq!(meaning.pfm_scale().parse(), Ok(-1.0));
+            assert_eq!(MapUnit::from_text(&map_unit.text()), Some(map_unit));
+            assert_eq!(map_unit.pfm_scale().parse(), Ok(-1.0));
         }
-        let assumed = Meaning::Disparity { rig: Some(StereoRig { metric: false, ..rig }) };
+        let assumed = MapUnit::Disparity { rig: Some(StereoRig { metric: false, ..rig }) };
         assert_eq!(
-            Meaning::of_text(&assumed.text()),
-            Some(Meaning::Disparity { rig: None }),
+            MapUnit::from_text(&assumed.text()),
+            Some(MapUnit::Disparity { rig: None }),
             "no distances of cameras that are assumed"
         );
         for other in [
@@ -105,9 +105,9 @@ mod tests {
             "disparity",
             "height units_per_metre=1",
         ] {
-            assert_eq!(Meaning::of_text(other), None, "{other}");
+            assert_eq!(MapUnit::from_text(other), None, "{other}");
         }
-        assert_eq!(Meaning::of_pfm_scale("-1"), None);
-        assert_eq!(Meaning::of_pfm_scale("-100e-2"), Some(Meaning::Disparity { rig: None }));
+        assert_eq!(MapUnit::from_pfm_scale("-1"), None);
+        assert_eq!(MapUnit::from_pfm_scale("-100e-2"), Some(MapUnit::Disparity { rig: None }));
     }
 }

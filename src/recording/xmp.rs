@@ -24,7 +24,7 @@ const REPORTED_LOSSES: [(&str, &str); 2] =
     [("xmpNote:HasExtendedXMP", "Extended XMP"), ("GDepth:Format", "the depth map in its XMP")];
 
 /// Returns, in words, the parts of a packet that are not kept.
-pub(super) fn lost(packet: &[u8]) -> impl Iterator<Item = &'static str> {
+pub(super) fn find_lost_properties(packet: &[u8]) -> impl Iterator<Item = &'static str> {
     let has = |name: &str| packet.windows(name.len()).any(|bytes| bytes == name.as_bytes());
     REPORTED_LOSSES.into_iter().filter(move |(name, _)| has(name)).map(|(_, word)| word)
 }
@@ -33,9 +33,9 @@ pub(super) fn lost(packet: &[u8]) -> impl Iterator<Item = &'static str> {
 ///
 /// # Errors
 /// Returns, in words, what cannot be kept.
-pub(super) fn kept(packet: Vec<u8>) -> Result<String, &'static str> {
+pub(super) fn keep_valid_parts(packet: Vec<u8>) -> Result<String, &'static str> {
     let packet = String::from_utf8(packet).map_err(|_| "XMP that is not in UTF-8")?;
-    let packet = without_attributes(&packet, &EXTERNAL_PREFIXES);
+    let packet = remove_attributes(&packet, &EXTERNAL_PREFIXES);
     let is_there = |name: &&str| packet.contains(&format!("<{name}"));
     if EXTERNAL_PREFIXES.iter().chain(&THUMBNAILS).any(is_there) || packet.contains(THUMBNAILS[1]) {
         return Err("XMP that has other pictures");
@@ -44,14 +44,14 @@ pub(super) fn kept(packet: Vec<u8>) -> Result<String, &'static str> {
 }
 
 /// Removes attributes with these prefixes. The declarations of the prefixes stay, which is harmless.
-fn without_attributes(packet: &str, prefixes: &[&str]) -> String {
+fn remove_attributes(packet: &str, prefixes: &[&str]) -> String {
     let mut kept = String::with_capacity(packet.len());
     let mut rest = packet;
     while let Some(at) = rest.find(|c: char| c.is_ascii_whitespace()) {
         let name = rest[at..].trim_ascii_start();
-        let is_one = prefixes.iter().any(|prefix| name.starts_with(prefix));
+        let is_removed = prefixes.iter().any(|prefix| name.starts_with(prefix));
         let space = rest.len() - name.len();
-        match is_one.then(|| attribute_bytes(name)).flatten() {
+        match is_removed.then(|| attribute_length(name)).flatten() {
             Some(bytes) => {
                 kept.push_str(&rest[..at]);
                 rest = &name[bytes..];
@@ -66,7 +66,7 @@ fn without_attributes(packet: &str, prefixes: &[&str]) -> String {
 }
 
 /// Returns the length of the attribute at the start of a text: a name, `=`, and a quoted value.
-fn attribute_bytes(text: &str) -> Option<usize> {
+fn attribute_length(text: &str) -> Option<usize> {
     let (name, value) = text.split_once('=')?;
     let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, ':' | '_' | '-' | '.');
     let quoted = value.trim_ascii_start();
@@ -103,22 +103,22 @@ mod tests {
 
     #[test]
     fn rights_stay_and_what_is_about_other_parts_of_the_file_does_not() {
-        let kept = |attributes: &str, elements: &str| kept(packet(attributes, elements).into_bytes());
+        let kept = |attributes: &str, elements: &str| keep_valid_parts(packet(attributes, elements).into_bytes());
         let plain = packet("", "<dc:title>GDepth: a poem = 'x'</dc:title>");
         assert_eq!(kept("", "<dc:title>GDepth: a poem = 'x'</dc:title>"), Ok(plain));
         let depth = " GDepth:Format=\"RangeInverse\"\n GDepth:Data = 'AAAA=='\txmpNote:HasExtendedXMP=\"1F\"";
         assert_eq!(kept(depth, ""), Ok(packet("", "")));
         assert_eq!(
-            lost(packet(depth, "").as_bytes()).collect::<Vec<_>>(),
+            find_lost_properties(packet(depth, "").as_bytes()).collect::<Vec<_>>(),
             ["Extended XMP", "the depth map in its XMP"]
         );
-        assert_eq!(lost(packet("", "").as_bytes()).count(), 0);
+        assert_eq!(find_lost_properties(packet("", "").as_bytes()).count(), 0);
         // An unterminated value stays as it is.
         assert!(kept(" GDepth:Data=\"AAAA", "").unwrap().contains("GDepth:Data"));
         for elements in ["<GDepth:Data>AAAA</GDepth:Data>", "<xmp:Thumbnails/>", "<Container:Directory/>"] {
             assert!(kept("", elements).is_err(), "{elements}");
         }
-        assert!(super::kept(vec![0xff, 0xfe, b'<', 0]).is_err());
+        assert!(super::keep_valid_parts(vec![0xff, 0xfe, b'<', 0]).is_err());
     }
 
     #[test]
@@ -129,7 +129,7 @@ mod tests {
             ("<tiff:Orientation>1</tiff:Orientation>", "<tiff:Orientation>1</tiff:Orientation>"),
             (" tiff:Orientation", " tiff:Orientation"),
         ] {
-            assert_eq!(kept(held.into()), Ok(upright.into()));
+            assert_eq!(keep_valid_parts(held.into()), Ok(upright.into()));
         }
     }
 }

@@ -49,14 +49,14 @@ pub enum SinkError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// Writing failed, but the frames until then are kept.
-    #[error("{error}; the output until then is kept as {}", kept.display())]
+    #[error("{error}; the frames written before it are kept in {}", kept.display())]
     Kept {
         error: Box<SinkError>,
         /// The file or folder.
         kept: PathBuf,
     },
     /// Writing failed, and the frames until then could not be kept.
-    #[error("{error}; the output until then is lost: {cause}")]
+    #[error("{error}; the frames written before it are lost as well: {cause}")]
     Lost {
         error: Box<SinkError>,
         /// Why they could not be kept.

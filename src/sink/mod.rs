@@ -51,7 +51,7 @@ pub use y4m::{Y4m, Y4mFile};
 
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::stats::{NodeUse, OutputUse};
+use crate::stats::{NodeCounts, OutputCounts};
 
 /// Whether the output has all frames of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,12 +140,12 @@ pub trait Sink: Send {
     }
 
     /// Returns the counters of frames sent to PipeWire cameras.
-    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
         Vec::new()
     }
 
     /// Returns the counters of outputs that get their frames asynchronously.
-    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
+    fn output_counters(&self) -> Vec<Counter<OutputCounts>> {
         Vec::new()
     }
 

@@ -5,8 +5,8 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{Ending, SinkError};
-use crate::files::input::special_file_kind;
-use crate::files::whole::{self, Part};
+use crate::files::atomic_file::{self, PartFile};
+use crate::files::input::find_special_file_kind;
 
 /// A file under construction that holds frames. A file with frames is never removed: if it cannot get its name, it is
 /// kept as `NAME.incomplete`.
@@ -15,7 +15,7 @@ pub(super) struct OutputFile {
     path: PathBuf,
     force: bool,
     /// `None` once it has ended.
-    part: Option<Part>,
+    part: Option<PartFile>,
     /// Number of frames in it.
     pub frames: u64,
 }
@@ -24,7 +24,7 @@ impl OutputFile {
     /// Prepares to write `path`, creating missing parent folders. Unfinished files of a killed run are kept, which is
     /// logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
-        if let Some(what) = special_file_kind(path) {
+        if let Some(what) = find_special_file_kind(path) {
             return Err(SinkError::NoFile { path: path.to_owned(), what });
         }
         if !force && path.symlink_metadata().is_ok() {
@@ -36,7 +36,7 @@ impl OutputFile {
         for kept in keep_leftovers(path)? {
             tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
         }
-        let part = Part::create(path).map_err(SinkError::write(path))?;
+        let part = PartFile::create(path).map_err(SinkError::write(path))?;
         Ok(Self { path: path.to_owned(), force, part: Some(part), frames: 0 })
     }
 
@@ -52,23 +52,23 @@ impl OutputFile {
 
     /// The temporary name.
     pub(super) fn part_path(&self) -> &Path {
-        self.part.as_ref().map_or(&self.path, Part::part)
+        self.part.as_ref().map_or(&self.path, PartFile::part_path)
     }
 
     pub(super) fn file(&self) -> io::Result<&File> {
-        self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
+        self.part.as_ref().map(PartFile::file).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
     /// Fails if the file was removed: anything further written to it would be lost.
     pub(super) fn check_exists(&self) -> Result<(), SinkError> {
-        match self.part.as_ref().is_some_and(Part::is_removed) {
+        match self.part.as_ref().is_some_and(PartFile::is_removed) {
             true => Err(SinkError::Removed { path: self.path.clone() }),
             false => Ok(()),
         }
     }
 
     /// Continues with a file that has the same frames in a better form.
-    pub(super) fn replace_part(&mut self, part: Part) {
+    pub(super) fn replace_part(&mut self, part: PartFile) {
         // Dropping the old part removes it.
         self.part = Some(part);
     }
@@ -108,7 +108,7 @@ impl OutputFile {
     }
 
     /// Keeps a part that has frames, and adds its location to the error; removes any other.
-    fn keep_if_frames(&self, part: Part, error: SinkError) -> SinkError {
+    fn keep_if_frames(&self, part: PartFile, error: SinkError) -> SinkError {
         // An encoder may have accepted frames and not written any yet.
         let has_frames = self.frames > 0 && part.file().metadata().is_ok_and(|file| file.len() > 0);
         if !has_frames {
@@ -133,7 +133,7 @@ impl Drop for OutputFile {
 }
 
 /// Keeps the part, and returns where as text for a message.
-fn keep_part(part: Part) -> String {
+fn keep_part(part: PartFile) -> String {
     match part.keep_incomplete() {
         Ok(kept) => format!("is kept as {}", kept.display()),
         Err(cause) => format!("is lost: {cause}"),
@@ -143,7 +143,7 @@ fn keep_part(part: Part) -> String {
 /// Keeps the files that killed runs left of `path`; returns the new names.
 fn keep_leftovers(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
     // A folder may be writable without being readable.
-    let abandoned = whole::left_behind(path).unwrap_or_default();
+    let abandoned = atomic_file::find_abandoned(path).unwrap_or_default();
     let kept = abandoned.into_iter().map(|part| keep_or_remove_part(&part, path));
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }
@@ -152,7 +152,7 @@ fn keep_leftovers(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
 fn keep_or_remove_part(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     let done = match part.metadata().map(|part| part.len()) {
         Ok(0) => fs::remove_file(part).map(|()| None),
-        Ok(_) => whole::keep_incomplete(part, path).map(Some),
+        Ok(_) => atomic_file::keep_incomplete(part, path).map(Some),
         Err(error) => Err(error),
     };
     match done {
@@ -165,7 +165,7 @@ fn keep_or_remove_part(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> 
 /// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; returns the new names.
 /// Ignores videos whose `NAME` does not satisfy `is_ours`, and those that cannot be renamed.
 pub fn recover_videos(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
-    let abandoned = whole::all_left_behind(folder).unwrap_or_default().into_iter();
+    let abandoned = atomic_file::find_all_abandoned(folder).unwrap_or_default().into_iter();
     let ours = abandoned.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
     ours.filter_map(|(part, name)| keep_or_remove_part(&part, &folder.join(name)).ok().flatten()).collect()
 }

@@ -12,7 +12,7 @@ use std::{io, mem};
 use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::frame::ColorImage;
 use crate::link::{self, Abandoned, Received, Sender, Sent};
-use crate::stats::{NodeUse, OutputUse};
+use crate::stats::{NodeCounts, OutputCounts};
 
 /// An output that takes longer than this to complete is reported to the user, who waits for it.
 const WAIT_NOTICE_DELAY: Duration = Duration::from_secs(3);
@@ -27,7 +27,7 @@ pub(super) struct OutputThread {
     shared: Arc<Shared>,
     outcome: Receiver<Outcome>,
     thread: Option<JoinHandle<()>>,
-    node_counters: Vec<Counter<NodeUse>>,
+    node_counters: Vec<Counter<NodeCounts>>,
 }
 
 /// A picture shared by several outputs.
@@ -179,9 +179,9 @@ impl OutputThread {
     }
 
     /// Creates a counter of its frames, which stays valid after its end.
-    pub fn create_counter(&self) -> Counter<OutputUse> {
+    pub fn create_counter(&self) -> Counter<OutputCounts> {
         let (output, shared) = (self.name.clone(), Arc::clone(&self.shared));
-        Arc::new(move || OutputUse {
+        Arc::new(move || OutputCounts {
             output: output.clone(),
             frames: shared.frames.load(Ordering::Relaxed),
             repeats: shared.repeats.load(Ordering::Relaxed),
@@ -189,7 +189,7 @@ impl OutputThread {
         })
     }
 
-    pub fn node_counters(&self) -> &[Counter<NodeUse>] {
+    pub fn node_counters(&self) -> &[Counter<NodeCounts>] {
         &self.node_counters
     }
 }

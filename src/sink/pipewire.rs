@@ -24,7 +24,7 @@ use crate::pipewire::PipeWireError;
 use crate::pipewire::graph::Graph;
 use crate::pipewire::mode::{Mode, NegotiatedFormat};
 use crate::pipewire::node::{DrawnPicture, Node, PictureMemory, PictureSource, Settings};
-use crate::stats::NodeUse;
+use crate::stats::NodeCounts;
 
 /// Default name of a camera.
 const DEFAULT_NAME: &str = "bokehcam";
@@ -224,10 +224,10 @@ impl Sink for PipeWire {
         true
     }
 
-    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
         let (node, counts) = (self.node.name().to_owned(), Arc::clone(self.node.counts()));
         let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        vec![Arc::new(move || NodeUse {
+        vec![Arc::new(move || NodeCounts {
             node: node.clone(),
             shown: load(&counts.shown),
             repeats: load(&counts.repeats),

@@ -8,8 +8,8 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::{Ending, Options, Sink, SinkError};
-use crate::files::folder::{Folder, Set};
-use crate::files::whole::Part;
+use crate::files::atomic_file::PartFile;
+use crate::files::folder::{FileSet, Folder};
 use crate::frame::ColorImage;
 
 /// Writes `DIR/000000.png` and on, numbered in output order. Each file appears complete; files of an earlier run stay
@@ -28,23 +28,23 @@ impl PngFolder {
     /// The folder is not empty and `force` is not set, contains another program's file with the name of an expected
     /// frame, or cannot be created.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
-        let has =
+        let contains =
             |name: &str| parse_number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
-        let folder = Folder::open(path, options.force, &Set { subfolders: &[], has: &has })?;
+        let folder = Folder::open(path, options.force, &FileSet { subfolders: &[], contains: &contains })?;
         Ok(Self { path: path.to_owned(), folder: Some(folder), next_number: 0 })
     }
 
     fn write_png(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
         let Some(folder) = &mut self.folder else { return Ok(()) };
-        let part = folder.begin(&file_name(self.next_number))?;
+        let part = folder.create_file(&file_name(self.next_number))?;
         encode_png(frame, &part)?;
-        folder.put(part)?;
+        folder.commit_file(part)?;
         self.next_number += 1;
         Ok(())
     }
 }
 
-fn encode_png(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
+fn encode_png(frame: &ColorImage, part: &PartFile) -> Result<(), SinkError> {
     let mut buffered = BufWriter::with_capacity(1 << 16, part.file());
     PngEncoder::new_with_quality(&mut buffered, CompressionType::Fast, FilterType::Sub)
         .write_image(&frame.rgb, frame.width, frame.height, ExtendedColorType::Rgb8)
@@ -69,7 +69,7 @@ impl Sink for PngFolder {
     fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let Err(error) = self.write_png(frame) else { return Ok(ControlFlow::Continue(())) };
         // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
-        let kept = self.folder.take().and_then(|folder| folder.cut().ok().flatten());
+        let kept = self.folder.take().and_then(|folder| folder.finish_incomplete().ok().flatten());
         Err(match kept {
             Some(kept) => SinkError::Kept { error: Box::new(error), kept },
             None => error,
@@ -85,7 +85,7 @@ impl Sink for PngFolder {
                 gone => tracing::warn!("{path}: {gone} files of an earlier run are replaced by {}", self.next_number),
             },
             Ending::Truncated => {
-                if let Some(kept) = folder.cut()? {
+                if let Some(kept) = folder.finish_incomplete()? {
                     tracing::warn!(
                         "{path} is unchanged: the new files are incomplete, and are kept as {}",
                         kept.display()

@@ -11,7 +11,7 @@ use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError, card};
 use crate::clock::Clock;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::stats::{NodeUse, OutputUse};
+use crate::stats::{NodeCounts, OutputCounts};
 
 /// A sink whose pictures can be blocked through its [`ShutterControl`]. The card is shown at once, also between two frames;
 /// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
@@ -230,11 +230,11 @@ impl Sink for Shutter {
         self.sink.outputs_without_card()
     }
 
-    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
         self.sink.node_counters()
     }
 
-    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
+    fn output_counters(&self) -> Vec<Counter<OutputCounts>> {
         self.sink.output_counters()
     }
 

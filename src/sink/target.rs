@@ -60,7 +60,7 @@ impl FromStr for Target {
                 is_label.then(|| Self::PipeWire(Some(label.to_owned()))).ok_or(SinkError::NoLabel)
             }
             _ if is_device(&path) => Ok(Self::Device(path)),
-            _ if name.ends_with('/') || folder::is_ours(&path) => Ok(Self::Folder(path)),
+            _ if name.ends_with('/') || folder::has_file_list(&path) => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
             // An unknown name must not become a folder: a typo in the name of a camera would fill the disk.
@@ -174,6 +174,6 @@ fn is_same_place(one: &Path, other: &Path) -> bool {
     let device = |path: &Path| fs::metadata(path).ok().filter(|node| node.file_type().is_char_device());
     match (device(one), device(other)) {
         (Some(one), Some(other)) => one.rdev() == other.rdev(),
-        _ => place::resolved(one) == place::resolved(other),
+        _ => place::resolve_links(one) == place::resolve_links(other),
     }
 }

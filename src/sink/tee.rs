@@ -11,7 +11,7 @@ use super::output_thread::{Backpressure, Outcome, OutputThread, PicturePool};
 use super::tee_control::{MemberEvent, Request, TeeControl};
 use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::frame::ColorImage;
-use crate::stats::{NodeUse, OutputUse};
+use crate::stats::{NodeCounts, OutputCounts};
 
 /// Sends every frame to each of its sinks, each on a thread of its own, so that in real time none waits for another.
 ///
@@ -36,8 +36,8 @@ pub struct Tee {
     captured_ns: u64,
     /// The first error of an output.
     first_error: Option<SinkError>,
-    output_counters: Vec<Counter<OutputUse>>,
-    node_counters: Vec<Counter<NodeUse>>,
+    output_counters: Vec<Counter<OutputCounts>>,
+    node_counters: Vec<Counter<NodeCounts>>,
 }
 
 /// Period of checks for ended outputs, for requests, and for space where frames wait.
@@ -221,7 +221,7 @@ impl Sink for Tee {
     }
 
     /// Counters of all outputs ever added; with a control, only of the current ones.
-    fn node_counters(&self) -> Vec<Counter<NodeUse>> {
+    fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
         match self.requests {
             Some(_) => self.outputs.iter().flat_map(|(_, output)| output.node_counters()).cloned().collect(),
             None => self.node_counters.clone(),
@@ -229,7 +229,7 @@ impl Sink for Tee {
     }
 
     /// Counters of all outputs ever added.
-    fn output_counters(&self) -> Vec<Counter<OutputUse>> {
+    fn output_counters(&self) -> Vec<Counter<OutputCounts>> {
         self.output_counters.clone()
     }
 

@@ -35,7 +35,7 @@ pub fn read_pair_calibration(
         // Not recognised and without a YAML extension: try `calib.txt`. A broken `.yml` keeps its own error.
         (Err(error), [file]) if !is_yaml(file) && is_unrecognized(&error) => {
             let stated = Geometry::read(file, pictures)?;
-            Ok(PairCalibration::Rectified { geometry: stated.fitted(file, size)?, made_for: stated.size })
+            Ok(PairCalibration::Rectified { geometry: stated.scaled_to(file, size)?, made_for: stated.size })
         }
         (Err(error), _) => Err(error.into()),
     }

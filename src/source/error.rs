@@ -29,7 +29,7 @@ pub enum SourceError {
         what: String,
     },
     /// A file cannot be read.
-    #[error("{}: {}", path.display(), input::said(source))]
+    #[error("{}: {}", path.display(), input::format_io_error(source))]
     Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Capture(#[from] CaptureError),

@@ -25,7 +25,7 @@ use crate::depth::recorded::RecordedDepth;
 use crate::frame::DepthMap;
 #[cfg(feature = "camera")]
 use crate::layout::Content;
-use crate::recording::{Pair, Recording};
+use crate::recording::{Recording, StereoGeometry};
 #[cfg(feature = "camera")]
 use crate::v4l2::live::ModeRequest;
 
@@ -41,7 +41,7 @@ pub(super) struct Opened {
     pub depth_from: DepthOrigin,
     pub first_depth: Option<DepthMap>,
     /// The stereo geometry that the source states.
-    pub pair: Pair,
+    pub pair: StereoGeometry,
     /// The number of disparities, if a recording states it.
     pub disparities: Option<u32>,
 }
@@ -55,7 +55,7 @@ impl Opened {
             depth: None,
             depth_from: DepthOrigin::Nothing,
             first_depth: None,
-            pair: Pair::Unstated,
+            pair: StereoGeometry::Uncalibrated,
             disparities: None,
         };
         match name {
@@ -76,11 +76,11 @@ impl Opened {
                     frames: frames.frames,
                 };
                 let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
-                let pair = recording.pair().cloned();
+                let pair = recording.stereo_geometry().cloned();
                 if pair.is_some() && request.uses_stereo(recording.has_depth()) {
                     camera = camera.with_right_camera();
                 }
-                let disparities = recording.disparities();
+                let disparities = recording.disparity_count();
                 let depth_from = recorded_depth_origin(&recording);
                 request.check_relative_depth(depth_from)?;
                 let first_depth = request.read_first_depth(&recording);
@@ -92,7 +92,7 @@ impl Opened {
                     depth,
                     depth_from,
                     first_depth,
-                    pair: pair.unwrap_or(Pair::Unstated),
+                    pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
                     disparities,
                     ..without_depth(Box::new(camera))
                 })

@@ -25,7 +25,7 @@ pub fn is_photo(path: &Path) -> bool {
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.
 pub fn original_path(path: &Path) -> PathBuf {
-    let before = snapshot::sources(path).0;
+    let before = snapshot::source_paths(path).0;
     if before.is_file() { before } else { path.to_owned() }
 }
 

@@ -12,7 +12,7 @@ use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
 use crate::look::Look;
 use crate::optics::StereoRig;
-use crate::recording::Pair;
+use crate::recording::StereoGeometry;
 
 /// The geometry of two cameras, sufficient for stereo matching.
 enum Geometry {
@@ -56,10 +56,15 @@ impl options::Stereo {
 
     /// Determines the geometry from the numbers in the options, else from `--calib`, else from the source (`pair`).
     /// Whether pictures are rectified is never guessed: matching raw ones gives plausible but wrong depth.
-    fn resolve_geometry(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Geometry, SourceError> {
+    fn resolve_geometry(
+        &self,
+        pair: &StereoGeometry,
+        source_name: &str,
+        size: (u32, u32),
+    ) -> Result<Geometry, SourceError> {
         if let Some(rig) = self.rig_from_options()? {
             return match (self.rectified, pair) {
-                (true, _) | (false, Pair::Rectified(_)) => Ok(Geometry::Rectified(rig)),
+                (true, _) | (false, StereoGeometry::Rectified(_)) => Ok(Geometry::Rectified(rig)),
                 _ => Err(SourceError::Usage(
                     "--focal-px and --baseline-m describe a rectified pair: add --rectified if the pictures are \
                      rectified, or use --calib FILE"
@@ -70,13 +75,13 @@ impl options::Stereo {
         let from_file = match self.calib.is_empty() {
             true => None,
             false => Some(match calib::read_pair_calibration(&self.calib, Path::new(source_name), size)? {
-                PairCalibration::Rectified { geometry, .. } => Pair::Rectified(geometry.rig),
-                PairCalibration::Raw(calibration) => Pair::Raw(calibration),
+                PairCalibration::Rectified { geometry, .. } => StereoGeometry::Rectified(geometry.rig),
+                PairCalibration::Raw(calibration) => StereoGeometry::Raw(calibration),
             }),
         };
         match from_file.as_ref().unwrap_or(pair) {
-            Pair::Rectified(rig) => Ok(Geometry::Rectified(*rig)),
-            Pair::Raw(calibration) => {
+            StereoGeometry::Rectified(rig) => Ok(Geometry::Rectified(*rig)),
+            StereoGeometry::Raw(calibration) => {
                 // Rectified already with this calibration: only its geometry is needed.
                 let stated = if self.rectified {
                     Geometry::Rectified(Rectification::from_calibration(calibration, size)?.rig())
@@ -88,8 +93,10 @@ impl options::Stereo {
                 }
                 Ok(stated)
             }
-            Pair::Unstated if self.rectified => Ok(Geometry::Rectified(StereoRig::default_for_width(size.0))),
-            Pair::Unstated => Err(SourceError::Usage(
+            StereoGeometry::Uncalibrated if self.rectified => {
+                Ok(Geometry::Rectified(StereoRig::default_for_width(size.0)))
+            }
+            StereoGeometry::Uncalibrated => Err(SourceError::Usage(
                 "stereo depth needs --calib FILE, or --rectified if the pictures are rectified already".to_string(),
             )),
         }
@@ -103,7 +110,7 @@ impl options::Stereo {
 /// The geometry is not stated, a calibration is invalid, or the requested GPU does not exist.
 pub fn open_stereo(
     info: &SourceInfo,
-    pair: &Pair,
+    pair: &StereoGeometry,
     disparities: Option<u32>,
     options: &options::Stereo,
     computing: &ComputeOptions,

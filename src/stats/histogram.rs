@@ -25,7 +25,7 @@ impl Default for Histogram {
 impl Histogram {
     /// Adds one time.
     pub fn add(&mut self, time_ns: u64) {
-        self.counts[bucket(time_ns)] += 1;
+        self.counts[bucket_index(time_ns)] += 1;
         self.samples += 1;
         self.max_ns = self.max_ns.max(time_ns);
     }
@@ -48,7 +48,7 @@ impl Histogram {
         for (index, &count) in self.counts.iter().enumerate() {
             cumulative += count;
             if cumulative >= rank {
-                return middle_ns(index).min(self.max_ns);
+                return bucket_middle_ns(index).min(self.max_ns);
             }
         }
         0
@@ -56,7 +56,7 @@ impl Histogram {
 }
 
 /// Returns the bucket of `time_ns`.
-fn bucket(time_ns: u64) -> usize {
+fn bucket_index(time_ns: u64) -> usize {
     let time_ns = time_ns.min((1 << MAX_BITS) - 1);
     // Below SPLIT each bucket is a single nanosecond.
     let shift = (time_ns | SPLIT).ilog2() - SPLIT_BITS;
@@ -64,7 +64,7 @@ fn bucket(time_ns: u64) -> usize {
 }
 
 /// Returns the time in the middle of a bucket.
-fn middle_ns(bucket: usize) -> u64 {
+fn bucket_middle_ns(bucket: usize) -> u64 {
     let bucket = bucket as u64;
     let shift = (bucket >> SPLIT_BITS).saturating_sub(1);
     let first_ns = (bucket - (shift << SPLIT_BITS)) << shift;
@@ -100,14 +100,14 @@ mod tests {
         let mut time_ns = 1u64;
         let mut last_bucket = 0;
         while time_ns < 1 << MAX_BITS {
-            let bucket = bucket(time_ns);
+            let bucket = bucket_index(time_ns);
             assert!(bucket >= last_bucket && bucket < BUCKETS);
             last_bucket = bucket;
-            let error = middle_ns(bucket).abs_diff(time_ns) as f64 / time_ns as f64;
+            let error = bucket_middle_ns(bucket).abs_diff(time_ns) as f64 / time_ns as f64;
             assert!(error <= 0.01 && (time_ns >= SPLIT || error == 0.0), "{time_ns} ns is off by {error}");
             time_ns += 1 + time_ns / 97;
         }
-        assert_eq!(bucket(u64::MAX), BUCKETS - 1);
+        assert_eq!(bucket_index(u64::MAX), BUCKETS - 1);
     }
 
     #[test]

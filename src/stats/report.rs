@@ -5,11 +5,11 @@ use std::io;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::{Frames, Histogram, NodeUse, OutputUse, Timings};
+use super::{FrameCounts, Histogram, NodeCounts, OutputCounts, Timings};
 
 /// The parts of a run, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
-pub struct About {
+pub struct RunInfo {
     /// The source of the frames.
     pub source: String,
     /// Their destination.
@@ -21,24 +21,24 @@ pub struct About {
     /// CPU time of the program meanwhile, in nanoseconds.
     pub cpu_ns: u64,
     /// The outputs, if there are several.
-    pub outputs: Vec<OutputUse>,
+    pub outputs: Vec<OutputCounts>,
     /// The PipeWire cameras.
-    pub pipewire: Vec<NodeUse>,
+    pub pipewire: Vec<NodeCounts>,
 }
 
 /// The report (`--report`). Times are in milliseconds.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
     /// Counts of all frames, by fate.
-    pub frames: Frames,
+    pub frames: FrameCounts,
     /// Time from capture to delivery.
-    pub latency_ms: Option<Spread>,
+    pub latency_ms: Option<Percentiles>,
     /// Time from one delivery to the next.
-    pub frame_ms: Option<Spread>,
+    pub frame_ms: Option<Percentiles>,
     /// Times per stage, and per pass of the blur as `blur.PASS`.
     pub stages_ms: StagesMs,
     /// The quality levels used.
-    pub quality: QualityUse,
+    pub quality: QualityStats,
     /// Time that a frame's blur may take.
     pub budget_ms: f64,
     /// Frames whose blur took longer.
@@ -65,48 +65,48 @@ pub struct Report {
     pub cpu_s: f64,
     /// Counts per output, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub outputs: Vec<OutputUse>,
+    pub outputs: Vec<OutputCounts>,
     /// Counts per PipeWire camera.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub pipewire: Vec<NodeUse>,
+    pub pipewire: Vec<NodeCounts>,
     /// Measurements of the window, if there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub window: Option<WindowUse>,
+    pub window: Option<WindowStats>,
     /// The versions that produced this report.
     pub versions: Versions,
 }
 
 /// Frames that a window showed, and their latencies.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct WindowUse {
+pub struct WindowStats {
     /// Frames shown on the screen.
     pub presented: u64,
     /// Time from the start of the preview to its first frame.
     pub first_frame_ms: Option<f64>,
     /// Time from capture to the screen.
-    pub latency_ms: Option<Spread>,
+    pub latency_ms: Option<Percentiles>,
     /// Time from an input to the picture that shows its effect.
-    pub reaction_ms: Option<Spread>,
+    pub reaction_ms: Option<Percentiles>,
     /// Time to draw a frame with its controls and to present it.
-    pub present_ms: Option<Spread>,
+    pub present_ms: Option<Percentiles>,
 }
 
-impl WindowUse {
+impl WindowStats {
     /// Summarises the measurements of a window.
     pub fn new(presented: u64, first_frame_ns: Option<u64>, [latency, reaction, present]: [&Histogram; 3]) -> Self {
         Self {
             presented,
-            first_frame_ms: first_frame_ns.map(ms),
-            latency_ms: Spread::of(latency),
-            reaction_ms: Spread::of(reaction),
-            present_ms: Spread::of(present),
+            first_frame_ms: first_frame_ns.map(to_ms),
+            latency_ms: Percentiles::from_histogram(latency),
+            reaction_ms: Percentiles::from_histogram(reaction),
+            present_ms: Percentiles::from_histogram(present),
         }
     }
 }
 
 /// Percentiles of a time.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Spread {
+pub struct Percentiles {
     /// Median.
     pub p50: f64,
     /// 95th percentile.
@@ -132,9 +132,9 @@ pub struct StagesMs(pub Vec<(String, StageMs)>);
 
 /// The quality levels used.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct QualityUse {
+pub struct QualityStats {
     /// Fraction of the blurred frames per quality level, summing to 1; in JSON these are members of the object itself.
-    pub share: Vec<(&'static str, f64)>,
+    pub fractions: Vec<(&'static str, f64)>,
     /// Number of changes of the level.
     pub switches: u64,
 }
@@ -150,14 +150,17 @@ pub struct Versions {
 
 impl Report {
     /// Summarises a run. Frame counts that do not [balance](Frames::balance) are a bug of this program and logged.
-    pub fn new(frames: Frames, timings: &Timings, about: About) -> Self {
-        if !frames.balance() {
+    pub fn new(frames: FrameCounts, timings: &Timings, info: RunInfo) -> Self {
+        if !frames.is_balanced() {
             tracing::error!(?frames, "the frames do not add up: please report this");
         }
         let mut stages = Vec::new();
         let mut stage = |name: String, times: &Histogram| {
             if times.samples() > 0 {
-                stages.push((name, StageMs { p50: ms(times.percentile_ns(0.5)), p99: ms(times.percentile_ns(0.99)) }));
+                stages.push((
+                    name,
+                    StageMs { p50: to_ms(times.percentile_ns(0.5)), p99: to_ms(times.percentile_ns(0.99)) },
+                ));
             }
         };
         stage("decode".into(), &timings.decode);
@@ -172,24 +175,24 @@ impl Report {
         let by = |by: Option<&str>| by.unwrap_or("none").to_owned();
         Self {
             frames,
-            latency_ms: Spread::of(&timings.sink.latency),
-            frame_ms: Spread::of(&timings.sink.frame),
+            latency_ms: Percentiles::from_histogram(&timings.sink.latency),
+            frame_ms: Percentiles::from_histogram(&timings.sink.frame),
             stages_ms: StagesMs(stages),
-            quality: timings.blur.quality_counts.shares(),
-            budget_ms: ms(about.budget_ns),
+            quality: timings.blur.quality_counts.fractions(),
+            budget_ms: to_ms(info.budget_ns),
             misses: timings.blur.misses,
             depth_held: timings.depth.reused,
-            repeats: timings.sink.repeats + about.outputs.iter().map(|output| output.repeats).sum::<u64>(),
+            repeats: timings.sink.repeats + info.outputs.iter().map(|output| output.repeats).sum::<u64>(),
             backend,
             adapter,
             refined_by: by(timings.depth.refined_by),
             matted_by: by(timings.depth.matted_by),
-            source: about.source,
-            sink: about.sink,
-            elapsed_s: ms(about.elapsed_ns) / 1000.0,
-            cpu_s: ms(about.cpu_ns) / 1000.0,
-            outputs: about.outputs,
-            pipewire: about.pipewire,
+            source: info.source,
+            sink: info.sink,
+            elapsed_s: to_ms(info.elapsed_ns) / 1000.0,
+            cpu_s: to_ms(info.cpu_ns) / 1000.0,
+            outputs: info.outputs,
+            pipewire: info.pipewire,
             window: None,
             versions: Versions {
                 bokehcam: env!("CARGO_PKG_VERSION"),
@@ -209,14 +212,14 @@ impl Report {
 }
 
 /// Returns milliseconds, rounded to three decimals, as the histograms are no more precise.
-fn ms(time_ns: u64) -> f64 {
+fn to_ms(time_ns: u64) -> f64 {
     (time_ns as f64 / 1e3).round() / 1e3
 }
 
-impl Spread {
-    fn of(times: &Histogram) -> Option<Self> {
-        let p = |p| ms(times.percentile_ns(p));
-        (times.samples() > 0).then(|| Self { p50: p(0.5), p95: p(0.95), p99: p(0.99), max: ms(times.max_ns()) })
+impl Percentiles {
+    fn from_histogram(times: &Histogram) -> Option<Self> {
+        let p = |p| to_ms(times.percentile_ns(p));
+        (times.samples() > 0).then(|| Self { p50: p(0.5), p95: p(0.95), p99: p(0.99), max: to_ms(times.max_ns()) })
     }
 }
 
@@ -226,11 +229,11 @@ impl Serialize for StagesMs {
     }
 }
 
-impl Serialize for QualityUse {
+impl Serialize for QualityStats {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.share.len() + 1))?;
-        for (rung, share) in &self.share {
-            map.serialize_entry(rung, share)?;
+        let mut map = serializer.serialize_map(Some(self.fractions.len() + 1))?;
+        for (level, fraction) in &self.fractions {
+            map.serialize_entry(level, fraction)?;
         }
         map.serialize_entry("switches", &self.switches)?;
         map.end()
@@ -239,7 +242,7 @@ impl Serialize for QualityUse {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Frames { captured, delivered, dropped, in_flight } = &self.frames;
+        let FrameCounts { captured, delivered, dropped, in_flight } = &self.frames;
         write!(f, "{delivered} of {captured} frames delivered in {:.2} s", self.elapsed_s)?;
         if self.elapsed_s > 0.0 {
             write!(f, " ({:.1} per second)", *delivered as f64 / self.elapsed_s)?;
@@ -250,7 +253,7 @@ impl fmt::Display for Report {
             }
         }
         if let Some(latency) = &self.latency_ms {
-            let Spread { p50, p95, p99, max } = latency;
+            let Percentiles { p50, p95, p99, max } = latency;
             write!(f, "\nlatency ms: p50 {p50:.1}, p95 {p95:.1}, p99 {p99:.1}, max {max:.1}")?;
         }
         for (name, StageMs { p50, p99 }) in self.stages_ms.0.iter().filter(|stage| !stage.0.contains('.')) {
@@ -260,9 +263,9 @@ impl fmt::Display for Report {
             }
         }
         if self.quality.switches > 0 {
-            let share = |(rung, share): &(&str, f64)| format!("{rung} {:.0} %", 100.0 * share);
-            let shares: Vec<String> = self.quality.share.iter().map(share).collect();
-            write!(f, "\nquality: {}; {} changes", shares.join(", "), self.quality.switches)?;
+            let percent = |(level, fraction): &(&str, f64)| format!("{level} {:.0} %", 100.0 * fraction);
+            let percents: Vec<String> = self.quality.fractions.iter().map(percent).collect();
+            write!(f, "\nquality: {}; {} changes", percents.join(", "), self.quality.switches)?;
         }
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames reused that of an earlier frame, to save time", self.depth_held)?;
@@ -277,25 +280,26 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::{Cause, Tally};
+    use crate::stats::{DropCause, FrameCounter};
 
     fn report() -> Report {
-        let tally = Tally::new();
+        let tally = FrameCounter::new();
         let mut timings = Timings::default();
         for frame in 0..10u64 {
-            let ticket = tally.captured(frame);
+            let ticket = tally.count_captured(frame);
             timings.decode.add(2_000_000);
             timings.blur.took.add(12_000_000);
             timings.blur.passes.add("rows", 7_000_000);
             timings.sink.latency.add(30_000_000 + frame);
-            tally.delivered(ticket);
+            tally.count_delivered(ticket);
         }
-        for rung in ["fast", "balanced", "balanced", "balanced"] {
-            timings.blur.quality_counts.add(rung);
+        for level in ["fast", "balanced", "balanced", "balanced"] {
+            timings.blur.quality_counts.add(level);
         }
-        tally.lost(3, Cause::Late);
-        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..About::default() };
-        Report::new(tally.frames(), &timings, about)
+        tally.count_lost(3, DropCause::Late);
+        let info =
+            RunInfo { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..RunInfo::default() };
+        Report::new(tally.frame_counts(), &timings, info)
     }
 
     #[test]
@@ -332,13 +336,13 @@ mod tests {
     #[test]
     fn a_run_without_a_frame_and_one_of_one_frame_have_reports() {
         let mut timings = Timings::default();
-        let empty = Report::new(Frames::default(), &timings, About::default());
+        let empty = Report::new(FrameCounts::default(), &timings, RunInfo::default());
         let mut text = Vec::new();
         empty.write_json(&mut text).unwrap();
         let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
         assert_eq!((&json["quality"], json["latency_ms"].is_null()), (&serde_json::json!({ "switches": 0 }), true));
         timings.sink.latency.add(5_000_000);
-        let latency_ms = Report::new(Frames::default(), &timings, About::default()).latency_ms;
-        assert_eq!(latency_ms, Some(Spread { p50: 5.0, p95: 5.0, p99: 5.0, max: 5.0 }));
+        let latency_ms = Report::new(FrameCounts::default(), &timings, RunInfo::default()).latency_ms;
+        assert_eq!(latency_ms, Some(Percentiles { p50: 5.0, p95: 5.0, p99: 5.0, max: 5.0 }));
     }
 }

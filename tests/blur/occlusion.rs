@@ -110,7 +110,7 @@ fn a_near_thing_before_the_subject_shows_the_subject_and_not_the_wall_behind_it(
             near_m: 10.0,
             far_m: 1e6,
             alpha: 1.0,
-            behind: 1.0,
+            background_alpha: 1.0,
             difference: [0, 1, 2].map(|p| subject[p] - wall[p]),
         })
         .collect();

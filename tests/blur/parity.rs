@@ -202,8 +202,14 @@ fn mixed_pixels_agree() {
     let of_others: Vec<u32> = (0..width * height).filter(|at| at % 5 < 2 && map.metres[*at as usize] == 1.0).collect();
     for at in of_others {
         if let Err(place) = map.matte.pixels.binary_search_by_key(&at, |pixel| pixel.at) {
-            let known =
-                MixedPixel { at, near_m: 1.0, far_m: 3.0, alpha: 1.0, behind: 1.0, difference: [0.1, -0.05, 0.02] };
+            let known = MixedPixel {
+                at,
+                near_m: 1.0,
+                far_m: 3.0,
+                alpha: 1.0,
+                background_alpha: 1.0,
+                difference: [0.1, -0.05, 0.02],
+            };
             map.matte.pixels.insert(place, known);
         }
     }

@@ -15,7 +15,7 @@ use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::sink::{Ending, Sink, SinkError};
-use bokehcam::stats::Cause;
+use bokehcam::stats::DropCause;
 
 pub const SIZE: (u32, u32) = (6, 4);
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -93,7 +93,7 @@ impl Camera for FakeCamera {
             return Ok(Captured::Corrupt(size_error()));
         }
         if index % self.unpaired_every == self.unpaired_every - 1 {
-            return Ok(Captured::Lost(1, Cause::Unpaired));
+            return Ok(Captured::Lost(1, DropCause::Unpaired));
         }
         let FrameBuffers { color, depth, right } = shot;
         color.resize(SIZE.0, SIZE.1);

@@ -68,7 +68,7 @@ impl Heard {
             keep_going: false,
             budget_ns: None,
             threads: 1,
-            folders: Folders::at(folder.to_owned()),
+            folders: Folders::single(folder.to_owned()),
             output_request: Arc::default(),
             demand: demand.clone(),
             off: Arc::default(),

@@ -106,7 +106,7 @@ fn off(map: &DepthMap, shot: &Shot) -> (f32, usize) {
     let (picture, _) = shot.taken();
     let (mut sum, count) = (0.0, map.matte.pixels.len());
     for pixel in &map.matte.pixels {
-        assert_eq!((pixel.near_m, pixel.alpha, pixel.behind), (1.0, 1.0, 1.0));
+        assert_eq!((pixel.near_m, pixel.alpha, pixel.background_alpha), (1.0, 1.0, 1.0));
         assert!((pixel.far_m - 4.0).abs() < 1e-3, "{pixel:?}");
         let (x, y) = (pixel.at % SIZE.0, pixel.at / SIZE.0);
         assert!(shot.is_person(x, y));

@@ -84,7 +84,7 @@ fn is_close(a: &MixedPixel, b: &MixedPixel) -> bool {
     let same = |a: f32, b: f32, most: f32| a == b || (a - b).abs() <= most;
     let colors = a.difference.iter().zip(&b.difference).all(|(a, b)| same(*a, *b, 0.01));
     let depths = same(a.near_m, b.near_m, 1e-4 * a.near_m) && same(a.far_m, b.far_m, 1e-4 * a.far_m);
-    same(a.alpha, b.alpha, 1e-3) && same(a.behind, b.behind, 1e-3) && depths && colors
+    same(a.alpha, b.alpha, 1e-3) && same(a.background_alpha, b.background_alpha, 1e-3) && depths && colors
 }
 
 fn assert_same(made: &DepthMap, expected: &DepthMap, one_in: usize, name: &str) {
@@ -107,7 +107,7 @@ fn same(device: &Arc<Device>, name: &str, one_in: usize, frames: &[Frame]) -> us
     for (k, frame) in frames.iter().enumerate() {
         let [expected, made] = [&mut cpu, &mut gpu].map(|matting| matted(matting, frame, None));
         assert_same(&made, &expected, one_in, &format!("{name}, frame {k}"));
-        assert!(made.matte.pixels.len() <= Matte::most(made.width as usize, made.height as usize));
+        assert!(made.matte.pixels.len() <= Matte::max_pixels(made.width as usize, made.height as usize));
         all += made.matte.pixels.len();
     }
     assert_eq!(gpu.backends(), "gpu", "{name}");
@@ -191,7 +191,7 @@ fn what_is_known_behind_counts_as_on_the_processor() {
         for behind in [Some(&behind), None, Some(&behind)] {
             let [expected, made] = [&mut cpu, &mut gpu].map(|matting| matted(matting, &frame, behind));
             assert_same(&made, &expected, ONE_IN, &format!("frame {k}, known: {}", behind.is_some()));
-            let known = |pixel: &&MixedPixel| pixel.behind == 1.0 && pixel.alpha > 0.1;
+            let known = |pixel: &&MixedPixel| pixel.background_alpha == 1.0 && pixel.alpha > 0.1;
             let known = made.matte.pixels.iter().filter(known).count();
             assert!((known > 15) == behind.is_some(), "frame {k}: behind {known} it is known");
         }
@@ -219,7 +219,7 @@ fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
         background.find_matte(&mut cpu, &mut workers, (&mut expected, &color), &lens);
         background.find_matte(&mut gpu, &mut workers, (&mut made, &color), &lens);
         assert_same(&made, &expected, ONE_IN, &format!("frame {k}"));
-        known += made.matte.pixels.iter().filter(|pixel| pixel.behind == 1.0 && pixel.alpha > 0.1).count();
+        known += made.matte.pixels.iter().filter(|pixel| pixel.background_alpha == 1.0 && pixel.alpha > 0.1).count();
         background.update(&mut workers, (&expected, &color), &lens, k as u64 * FRAME_NS);
     }
     assert!(known > 100, "behind {known} pixels it is known");

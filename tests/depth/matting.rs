@@ -165,7 +165,7 @@ fn what_cannot_have_a_matte_has_none() {
             near_m: 1.0,
             far_m: 2.0,
             alpha: 0.5,
-            behind: 0.5,
+            background_alpha: 0.5,
             difference: [0.1; 3],
         });
         Matting::default().find_mixed_pixels(map, &picture, jump);
@@ -255,7 +255,7 @@ fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
     let known = |at: u32| {
         let (near, far) = (light(RED), wall(at % SIZE.0, at / SIZE.0));
         let difference = std::array::from_fn(|p| near[p] - far[p]);
-        MixedPixel { at, near_m: NEAR_M, far_m: FAR_M, alpha: 1.0, behind: 1.0, difference }
+        MixedPixel { at, near_m: NEAR_M, far_m: FAR_M, alpha: 1.0, background_alpha: 1.0, difference }
     };
     map.matte.pixels = (0..SIZE.0 * SIZE.1).filter(|at| (20..44).contains(&(at % SIZE.0))).map(known).collect();
     let only_wall = color(SIZE.0, SIZE.1, |x, y| codes(wall(x, y)));
@@ -286,7 +286,8 @@ fn what_is_hidden_everywhere_is_never_seen() {
         for factor in [1.03, 1.1, 1.3, 4.0] {
             let mut map = depth(SIZE.0, SIZE.1, |_, _| near_m);
             let difference = std::array::from_fn(|p| own[p] - far[p]);
-            let pixel = |at| MixedPixel { at, near_m, far_m: factor * near_m, alpha: 1.0, behind: 1.0, difference };
+            let pixel =
+                |at| MixedPixel { at, near_m, far_m: factor * near_m, alpha: 1.0, background_alpha: 1.0, difference };
             map.matte.pixels = hiding.clone().map(pixel).collect();
             for quality in Quality::ALL {
                 let out = blur(&map, &picture, &field, quality);
@@ -314,5 +315,5 @@ fn mixed(picture: &ColorImage, at: u32, numbers: &mut Numbers) -> MixedPixel {
     let share = 0.05 + 0.9 * numbers.next();
     let own = light(std::array::from_fn(|p| picture.rgb[3 * at as usize + p]));
     let difference = own.map(|own| (2.0 * numbers.next() - 1.0) * own.min(1.0 - own));
-    MixedPixel { at, near_m: 0.8, far_m: 3.0, alpha: share, behind: 1.0 - share, difference }
+    MixedPixel { at, near_m: 0.8, far_m: 3.0, alpha: share, background_alpha: 1.0 - share, difference }
 }

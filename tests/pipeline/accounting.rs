@@ -70,7 +70,7 @@ fn a_live_link_evicts_behind_a_sink_that_stands_still() {
     });
     let stop = AtomicBool::new(false);
     let report = run(simple(camera, sink, &stop, Pace::Realtime)).unwrap();
-    assert!(report.frames.balance());
+    assert!(report.frames.is_balanced());
     assert!(report.frames.dropped.evicted > 180, "{:?}", report.frames);
     assert_eq!(report.frames.dropped.driver, 0, "a live camera is not asked to skip");
 }

@@ -63,7 +63,7 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
             })
             .unwrap()
         });
-        assert!(report.frames.balance(), "{:?}", report.frames);
+        assert!(report.frames.is_balanced(), "{:?}", report.frames);
         assert_eq!(wrong.load(Ordering::SeqCst), 0);
         assert!(blurred.load(Ordering::SeqCst) > 0);
         assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
@@ -131,7 +131,7 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
             });
             (report.unwrap(), looking.join().unwrap())
         });
-        assert!(report.frames.balance() && report.frames.captured == 300, "{:?}", report.frames);
+        assert!(report.frames.is_balanced() && report.frames.captured == 300, "{:?}", report.frames);
         assert_eq!(report.frames.in_flight, 0);
         if keeps {
             assert_eq!(report.frames.delivered, 300, "the sink had them all");
@@ -151,7 +151,7 @@ fn a_viewer_that_leaves_ends_the_run() {
     let report =
         run(Run { view: Some(view), ..simple(Box::new(fake_camera(usize::MAX)), nobody(), &stop, Pace::Asap) });
     let frames = report.unwrap().frames;
-    assert!(frames.balance() && frames.delivered == 0, "{frames:?}");
+    assert!(frames.is_balanced() && frames.delivered == 0, "{frames:?}");
 }
 
 #[test]

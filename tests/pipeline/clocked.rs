@@ -17,7 +17,7 @@ use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, ExecutorChange, OutputRequest, Pace, Run, Trace, run};
 use bokehcam::sink::Null;
-use bokehcam::stats::{Cause, Report};
+use bokehcam::stats::{DropCause, Report};
 
 use crate::fakes::{FakeBokeh, SIZE, Trouble, camera_by, changed, depth_by, fake_bokeh, sink_by};
 use crate::setup::{dof_with, simple};
@@ -146,7 +146,7 @@ fn play_seen(
         ..simple(Box::new(camera), sink, &stop, pace)
     })
     .unwrap();
-    assert!(report.frames.balance(), "{:?}", report.frames);
+    assert!(report.frames.is_balanced(), "{:?}", report.frames);
     assert_eq!((report.frames.captured, report.frames.delivered), (frames as u64, frames as u64));
     let fields = fields.lock().unwrap().clone();
     (report, fields, traces.into_inner())
@@ -234,7 +234,7 @@ fn whoever_asks_for_depth_of_its_own_gets_it_with_the_next_frame() {
     assert_eq!(held[34..40].iter().filter(|held| **held).count(), 3);
 }
 
-const LOSSES: [Cause; 3] = [Cause::Driver, Cause::Corrupt, Cause::Evicted];
+const LOSSES: [DropCause; 3] = [DropCause::Driver, DropCause::Corrupt, DropCause::Evicted];
 
 #[test]
 fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
@@ -250,7 +250,7 @@ fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
     });
     let stop = AtomicBool::new(false);
     let frames = run(simple(camera, Box::new(Null), &stop, Pace::Asap)).unwrap().frames;
-    assert!(frames.balance());
+    assert!(frames.is_balanced());
     let dropped = frames.dropped;
     assert_eq!((dropped.driver, dropped.corrupt, dropped.evicted, dropped.total()), (3, 5, 7, 15));
     assert_eq!((frames.captured, frames.delivered, frames.in_flight), (18, 3, 0));

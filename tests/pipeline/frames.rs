@@ -56,7 +56,7 @@ fn a_fixed_coc_and_no_blur_ask_for_no_depth() {
             .enumerate()
             .all(|(i, rgb)| rgb[..BLURRED].iter().all(|&b| b == i as u8))
     );
-    assert_eq!((report.backend.as_str(), report.quality.share.len()), ("none", 0));
+    assert_eq!((report.backend.as_str(), report.quality.fractions.len()), ("none", 0));
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn the_report_tells_what_ran() {
     let report = result.unwrap();
     assert_eq!((report.backend.as_str(), report.adapter.as_str()), ("cpu", "cpu, fake"));
     assert_eq!((report.source.as_str(), report.sink.as_str()), ("fake camera", "fake sink"));
-    assert_eq!(report.quality.share, [("fast", 1.0)]);
+    assert_eq!(report.quality.fractions, [("fast", 1.0)]);
     assert_eq!((report.budget_ms, report.misses), (0.5, 10), "0.7 ms of passes each");
     let stages: Vec<_> = report.stages_ms.0.iter().map(|stage| stage.0.as_str()).collect();
     assert_eq!(stages, ["decode", "depth", "blur", "blur.rows", "blur.columns", "sink"]);
@@ -106,7 +106,7 @@ fn quality_follows_the_time_there_is() {
             ..simple(Box::new(fake_camera(150)), Box::new(Null), &stop, Pace::Asap)
         });
         let quality_use = report.unwrap().quality;
-        let most = quality_use.share.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        let most = quality_use.fractions.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert_eq!((most.0, quality_use.switches <= 1), (quality, true), "{took_us}: {quality_use:?}");
     }
 }

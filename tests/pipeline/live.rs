@@ -113,7 +113,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
     .unwrap();
     assert_eq!(phases.load(Ordering::SeqCst), 4);
     assert_eq!(opened.load(Ordering::SeqCst), 2, "once for each time that somebody came");
-    assert!(report.frames.balance(), "{:?}", report.frames);
+    assert!(report.frames.is_balanced(), "{:?}", report.frames);
     // The frame at which the sink ended the run was not delivered.
     assert!(report.frames.delivered >= 2 * IN_A_PHASE as u64 - 1, "{:?}", report.frames);
     assert!(began.elapsed() < Duration::from_secs(300), "a hold is asked for anew each time");

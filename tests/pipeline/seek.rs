@@ -188,7 +188,7 @@ fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
         checked.join().unwrap();
         report
     });
-    assert!(report.frames.balance());
+    assert!(report.frames.is_balanced());
     assert_eq!(jumps.load(Ordering::SeqCst), 4, "depth is told each time");
 }
 

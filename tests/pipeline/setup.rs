@@ -98,7 +98,7 @@ impl Setup {
             Ok(report) => report,
             Err(error) => &error.report,
         };
-        assert!(report.frames.balance(), "{:?}", report.frames);
+        assert!(report.frames.is_balanced(), "{:?}", report.frames);
         assert_eq!(report.frames.delivered, received.count());
         assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
         assert_eq!(last.get().map_or(0, |progress| progress.delivered), received.count());

@@ -52,7 +52,7 @@ fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
         })
         .unwrap()
         .frames;
-        assert!(frames.balance(), "{frames:?}");
+        assert!(frames.is_balanced(), "{frames:?}");
         assert_eq!((frames.captured, frames.in_flight, frames.delivered), (60, 0, received.count()), "{pace:?}");
         if pace == Pace::Asap {
             assert_eq!((frames.delivered, frames.dropped.unpaired), (40, 20));

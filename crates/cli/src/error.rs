@@ -38,7 +38,7 @@ pub enum CliError {
     #[cfg(feature = "camera")]
     NeverReplaced(PathBuf),
     /// A file or folder cannot be read or written.
-    #[error("{}: {}", path.display(), input::said(source))]
+    #[error("{}: {}", path.display(), input::format_io_error(source))]
     Io {
         /// The file or folder.
         path: PathBuf,

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::log;
-use bokehcam::files::input::special_file_kind;
-use bokehcam::files::{place, whole};
+use bokehcam::files::input::find_special_file_kind;
+use bokehcam::files::{atomic_file, place};
 
 /// Refuses to replace files without `--force`.
 ///
@@ -16,7 +16,7 @@ use bokehcam::files::{place, whole};
 /// [`CliError::Exists`] if one of `paths` exists and `force` is not set; [`CliError::Usage`] if it is not a file.
 pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
     for path in paths {
-        if let Some(what) = special_file_kind(path) {
+        if let Some(what) = find_special_file_kind(path) {
             return Err(CliError::Usage(format!(
                 "{} is {what}, and is not replaced by a file; choose another name",
                 path.display()
@@ -34,10 +34,10 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
 /// # Errors
 /// [`CliError::Usage`] if `target`, the value of the option `what`, is `source`, lies in it, or contains it.
 pub fn refuse_overwriting_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
-    if !place::overlap(target, source) {
+    if !place::paths_overlap(target, source) {
         return Ok(());
     }
-    let [to, from] = [target, source].map(place::resolved);
+    let [to, from] = [target, source].map(place::resolve_links);
     let how = match (to == from, to.starts_with(&from)) {
         (true, _) => "this is",
         (_, true) => "this lies in",
@@ -52,7 +52,7 @@ pub fn refuse_overwriting_source(what: &str, target: &Path, source: &Path) -> Re
 /// # Errors
 /// [`CliError::Exists`] if the file exists without `replace`; [`CliError::Io`] if it cannot be written.
 pub fn write_atomically(path: &Path, bytes: &[u8], replace: bool) -> Result<(), CliError> {
-    whole::write(path, bytes, replace).map_err(|error| match error.kind() {
+    atomic_file::write(path, bytes, replace).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
         _ => CliError::io(path)(error),
     })
@@ -79,7 +79,7 @@ pub fn warn_of_leftovers<'a>(paths: impl IntoIterator<Item = &'a Path>) {
     };
     let folders: BTreeSet<&Path> = paths.into_iter().map(folder_of).collect();
     for folder in folders {
-        let left = whole::all_left_behind(folder).unwrap_or_default();
+        let left = atomic_file::find_all_abandoned(folder).unwrap_or_default();
         let names: Vec<String> = left.iter().take(3).map(|(part, _)| part.display().to_string()).collect();
         if !names.is_empty() {
             let more = left.len() - names.len();

@@ -200,7 +200,7 @@ fn check_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> 
     let is_near = |at: usize| map.metres[at] <= subject_m;
     let count = map.metres.len();
     let near = (0..count).filter(|&at| is_near(at)).count();
-    let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::overlap(plate, image));
+    let is_itself = plate.zip(image).is_some_and(|(plate, image)| place::paths_overlap(plate, image));
     match plate.map(Path::display) {
         Some(plate) if is_itself => {
             Some(format!("{plate}: the plate is the picture itself: no person is found, and everything is blurred"))

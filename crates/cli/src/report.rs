@@ -6,8 +6,8 @@ use std::path::Path;
 use super::error::CliError;
 use super::files::refuse_overwrite;
 use super::terminal::{print_to_stderr, print_to_stdout};
+use bokehcam::files::atomic_file::PartFile;
 use bokehcam::files::place;
-use bokehcam::files::whole::Part;
 use bokehcam::sink::Target;
 use bokehcam::stats::Report;
 
@@ -27,8 +27,8 @@ pub fn check_path(path: Option<&Path>, force: bool, targets: &[Target]) -> Resul
         };
     };
     for target in targets.iter().filter(|target| !target.is_camera()) {
-        let Some(place) = target.path().filter(|place| place::overlap(place, path)) else { continue };
-        let what = match place::resolved(place) == place::resolved(path) {
+        let Some(place) = target.path().filter(|place| place::paths_overlap(place, path)) else { continue };
+        let what = match place::resolve_links(place) == place::resolve_links(path) {
             true => format!("--to {target} writes to it, too; name another file"),
             false => format!("that folder is for the pictures of --to {target}; choose another folder"),
         };
@@ -52,7 +52,7 @@ pub fn check_path(path: Option<&Path>, force: bool, targets: &[Target]) -> Resul
 pub fn check_writable(path: Option<&Path>) -> Result<(), CliError> {
     match path {
         // Uses a part file next to it: opening the path itself would disturb the reader of a pipe.
-        Some(path) if path != STDOUT => Part::create(path).map(drop).map_err(CliError::io(path)),
+        Some(path) if path != STDOUT => PartFile::create(path).map(drop).map_err(CliError::io(path)),
         _ => Ok(()),
     }
 }
@@ -73,7 +73,7 @@ pub fn write_report(path: &Path, report: &Report, force: bool) -> Result<(), Cli
         ErrorKind::AlreadyExists => CliError::Exists(path.to_owned()),
         _ => CliError::io(path)(cause),
     };
-    let written = Part::create(path).and_then(|part| part.file().write_all(&json).map(|()| part));
+    let written = PartFile::create(path).and_then(|part| part.file().write_all(&json).map(|()| part));
     let error = match written {
         Ok(mut part) => match part.try_commit(force) {
             Ok(()) => return Ok(()),

@@ -33,7 +33,9 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
         }
         // The frames of a folder sink could overwrite a file within it.
         let lies_in = |other: &Target| match (other, target.path()) {
-            (Target::Folder(folder), Some(path)) => place::resolved(path).starts_with(place::resolved(folder)),
+            (Target::Folder(folder), Some(path)) => {
+                place::resolve_links(path).starts_with(place::resolve_links(folder))
+            }
             _ => false,
         };
         if let Some(folder) = targets.iter().find(|other| *other != target && lies_in(other)) {

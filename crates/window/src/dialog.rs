@@ -53,7 +53,8 @@ fn has_portal() -> bool {
         |name: &str, file: &str| std::env::var_os(name).is_some_and(|dir| PathBuf::from(dir).join(file).exists());
     let has_bus = std::env::var_os("DBUS_SESSION_BUS_ADDRESS").is_some() || is_there("XDG_RUNTIME_DIR", "bus");
     let service = "dbus-1/services/org.freedesktop.portal.Desktop.service";
-    has_bus && data::own().into_iter().chain(data::system()).any(|folder| folder.join(service).exists())
+    has_bus
+        && data::user_data_dir().into_iter().chain(data::system_data_dirs()).any(|folder| folder.join(service).exists())
 }
 
 fn has_zenity() -> bool {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use bokehcam::budget::{Quality, Window};
 use bokehcam::pipeline::{Trace, View};
-use bokehcam::stats::{Frames, Histogram};
+use bokehcam::stats::{FrameCounts, Histogram};
 
 /// Number of recent frames that the meters keep.
 pub const GRAPH_FRAMES: usize = 240;
@@ -34,7 +34,7 @@ pub struct Meters {
     /// Moving averages of the stage times.
     pub stages: Stages,
     /// Captured and dropped frames of the source.
-    pub frames: Frames,
+    pub frames: FrameCounts,
     /// Time of the last presented frame; `None` before the first.
     last_presented_ns: Option<u64>,
     /// Start of the preview.

@@ -158,7 +158,11 @@ impl System {
                         own.extend(is.then_some(depth_method))
                     };
                     has(&mut own, recording.as_ref().is_some_and(Recording::has_depth), DepthMethod::Measured);
-                    has(&mut own, recording.is_some_and(|recording| recording.pair().is_some()), DepthMethod::Stereo);
+                    has(
+                        &mut own,
+                        recording.is_some_and(|recording| recording.stereo_geometry().is_some()),
+                        DepthMethod::Stereo,
+                    );
                 }
                 _ => own.extend(
                     DepthMethod::from_origin(source.depth_from, &SingleCameraDepth::default(), false)

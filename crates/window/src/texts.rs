@@ -141,7 +141,7 @@ fn read_translation(path: &Path) -> Result<Table, String> {
 fn find_translation(language: &str) -> Option<PathBuf> {
     let language = language.split(['.', '@']).next().filter(|name| is_language_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
-    let folders: Vec<PathBuf> = data::own().into_iter().chain(data::system()).collect();
+    let folders: Vec<PathBuf> = data::user_data_dir().into_iter().chain(data::system_data_dirs()).collect();
     let named = |name: &str| {
         folders.iter().map(|folder| folder.join(format!("bokehcam/texts/{name}.toml"))).find(|path| path.is_file())
     };

@@ -62,7 +62,7 @@ impl DirectionalInpainting {
         });
         let unknown = &self.unknown;
         workers.run_each(self.steps.chunks_mut(unknown.len()).enumerate(), &|(way, steps)| {
-            arch.dispatch(CountSteps { way, unknown, stride, steps });
+            arch.dispatch(DistanceToKnown { way, unknown, stride, steps });
         });
         let (seen, level_stride) = (&*self, level.rows.stride);
         let each_len = each * level.rows.row_len();
@@ -117,14 +117,14 @@ impl WithSimd for CollectKnownPixels<'_> {
 }
 
 /// Distance transform along one way: steps of a pixel = steps of the pixel one step on, plus 1.
-struct CountSteps<'a> {
+struct DistanceToKnown<'a> {
     way: usize,
     unknown: &'a [u8],
     stride: usize,
     steps: &'a mut [u8],
 }
 
-impl WithSimd for CountSteps<'_> {
+impl WithSimd for DistanceToKnown<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {

@@ -24,7 +24,7 @@ const ONE_SURFACE: f32 = 0.49;
 
 /// Bins composited front to back at some pixels: each covers part of the remaining coverage.
 #[derive(Clone, Copy)]
-struct Stack<S: Simd> {
+struct LayerStack<S: Simd> {
     color: [S::f32s; 3],
     /// Uncovered fraction of each pixel.
     uncovered: S::f32s,
@@ -33,7 +33,7 @@ struct Stack<S: Simd> {
     known: S::f32s,
 }
 
-impl<S: Simd> Stack<S> {
+impl<S: Simd> LayerStack<S> {
     #[inline(always)]
     fn new(simd: S) -> Self {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
@@ -229,13 +229,13 @@ impl Layers {
     #[inline(always)]
     fn composite_all_surfaces<S: Simd>(&self, simd: S, back_visibility: S::f32s, x: usize) -> [S::f32s; 3] {
         let (near, rest) = self.planes[..self.count].split_at(self.near);
-        let mut back = Stack::new(simd);
+        let mut back = LayerStack::new(simd);
         for planes in rest {
             back.add(simd, load_layer(simd, planes, x));
         }
         let mut light = back.fill_uncovered(simd);
         if !near.is_empty() {
-            let mut front = Stack::new(simd);
+            let mut front = LayerStack::new(simd);
             for planes in near {
                 front.add(simd, load_layer(simd, planes, x));
             }
@@ -265,7 +265,7 @@ impl Layers {
         x: usize,
     ) -> ([S::f32s; 3], S::m32s) {
         let (zero, one, two) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(2.0));
-        let mut stack = Stack::new(simd);
+        let mut stack = LayerStack::new(simd);
         let inverse = simd.div_f32s(one, simd.add_f32s(simd.abs_f32s(coc_px), one));
         let slack = simd.min_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(0.5));
         for (planes, &(low_px, high_px)) in self.planes[..self.count].iter().zip(&self.ranges_px) {

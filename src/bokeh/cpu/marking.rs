@@ -94,7 +94,7 @@ impl WithSimd for MarkSilhouettes<'_> {
         let (Some(matte), Radii::Field(CocField::Depth(lens), _)) = (self.source.matte, self.source.coc) else {
             return;
         };
-        for pixel in matte.within(self.rows.start * width..self.rows.end * width) {
+        for pixel in matte.pixels_in(self.rows.start * width..self.rows.end * width) {
             let (x, y) = (pixel.at as usize % width, pixel.at as usize / width);
             let (near_px, far_px) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
             let row = &mut self.marks[(y - self.rows.start) / SILHOUETTE_CELL * DISTANCES_PER_CELL * across..]

@@ -123,7 +123,7 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
         }
         if let Some(matte) = self.source.matte {
             let rows = self.row * TILE_H * width..((self.row + 1) * TILE_H).min(height) * width;
-            for pixel in matte.within(rows) {
+            for pixel in matte.pixels_in(rows) {
                 let (low, high) = &mut self.ranges[pixel.at as usize % width / TILE_W];
                 (*low, *high) = (low.min(pixel.near_m), high.max(pixel.far_m));
             }

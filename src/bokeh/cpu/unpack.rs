@@ -197,7 +197,7 @@ impl<'a> InputFrame<'a> {
         let (Radii::Field(CocField::Depth(lens), _), Some(matte)) = (self.coc, self.matte) else { return };
         let start = range.start;
         let Surfaces { back, front, alpha, behind, mixed } = surfaces;
-        for pixel in matte.within(range) {
+        for pixel in matte.pixels_in(range) {
             if !*mixed {
                 front.0.as_flattened_mut().fill(0.0);
                 alpha.0.fill(0.0);
@@ -210,7 +210,7 @@ impl<'a> InputFrame<'a> {
                 true => compression_factor(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
                 false => 1.0,
             };
-            (alpha.0[x], behind.0[x]) = (pixel.alpha, pixel.behind);
+            (alpha.0[x], behind.0[x]) = (pixel.alpha, pixel.background_alpha);
             for p in 0..3 {
                 let own = back.0[p][x];
                 // Depth may be that of another frame with other colours: light is clamped to 0.

@@ -107,7 +107,7 @@ impl Buffers {
         let pyramid_pixels = if layered { count_pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let grid = if layered { width.div_ceil(SILHOUETTE_CELL) * height.div_ceil(SILHOUETTE_CELL) } else { 1 };
-        let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
+        let mixed = if layered { Matte::max_pixels(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { concatenate_kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
         Self {

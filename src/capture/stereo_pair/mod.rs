@@ -10,7 +10,7 @@ use std::time::Duration;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
-use crate::stats::{Cause, Histogram};
+use crate::stats::{DropCause, Histogram};
 use pairing::{Pairing, Verdict};
 
 /// One of the two cameras.
@@ -164,7 +164,7 @@ impl<E: PairedCamera> Camera for StereoPair<E> {
                 self.delivered += 1;
                 Captured::Frame(stamp)
             }
-            None => Captured::Lost(1, Cause::Unpaired),
+            None => Captured::Lost(1, DropCause::Unpaired),
         })
     }
 

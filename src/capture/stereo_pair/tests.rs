@@ -24,7 +24,7 @@ impl PairedCamera for FakeCamera {
         let overwritten = self.captured_ns[self.next..].windows(2).take_while(|pair| pair[1] <= now_ns).count();
         if overwritten > 0 {
             self.next += overwritten;
-            return Captured::Lost(overwritten as u64, Cause::Evicted);
+            return Captured::Lost(overwritten as u64, DropCause::Evicted);
         }
         let until_ns = now_ns + timeout.as_nanos() as u64;
         match self.captured_ns.get(self.next) {
@@ -68,7 +68,7 @@ fn play(camera: &mut StereoPair<FakeCamera>, clock: &Clock, takes_ns: u64) -> (V
                 pairs.push((color.rgb[0], right.luma[0]));
                 clock.advance_ns(takes_ns);
             }
-            Captured::Lost(count, Cause::Unpaired) => unpaired += count,
+            Captured::Lost(count, DropCause::Unpaired) => unpaired += count,
             Captured::Lost(count, _) => lost += count,
             Captured::Waiting => {}
             Captured::Corrupt(error) => panic!("{error}"),

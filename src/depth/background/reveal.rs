@@ -42,7 +42,7 @@ impl BackgroundMemory {
             std::mem::swap(&mut map.matte.pixels, first);
             others.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
         }
-        if map.matte.pixels.len() > Matte::most(size.0, size.1) {
+        if map.matte.pixels.len() > Matte::max_pixels(size.0, size.1) {
             map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
         self.pixels = pixels;
@@ -57,7 +57,7 @@ impl BackgroundMemory {
             difference[p] = self.own_light[usize::from(own[p])] - light[p];
         }
         let far_m = self.inverse[at].recip();
-        MixedPixel { at: at as u32, near_m: metres, far_m, alpha: 1.0, behind: 1.0, difference }
+        MixedPixel { at: at as u32, near_m: metres, far_m, alpha: 1.0, background_alpha: 1.0, difference }
     }
 }
 
@@ -78,7 +78,7 @@ impl WithSimd for Reveal<'_> {
         let Self { background, map, color, known, rows, pixels } = self;
         let width = background.size.0;
         pixels.clear();
-        let mut mixed = map.matte.within(rows.start * width..rows.end * width);
+        let mut mixed = map.matte.pixels_in(rows.start * width..rows.end * width);
         for y in rows {
             for columns in background.cells.selected_columns(y) {
                 let (first, end) = (y * width + columns.start, y * width + columns.end);

@@ -192,7 +192,7 @@ impl Matting {
     }
 
     /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
-    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::most`] edge pixels,
+    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::max_pixels`] edge pixels,
     /// only the largest steps count.
     pub fn find_mixed_pixels(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
         self.find_with_background(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
@@ -214,7 +214,7 @@ impl Matting {
         }
         #[cfg(not(feature = "gpu"))]
         let _ = device_frame;
-        let most = Matte::most(map.width as usize, map.height as usize);
+        let most = Matte::max_pixels(map.width as usize, map.height as usize);
         let least_step = depth_step;
         let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
         let is_noise_logged = &mut self.is_noise_logged;

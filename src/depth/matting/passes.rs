@@ -109,10 +109,11 @@ impl WithSimd for SeparateColors<'_> {
             for (k, (&place, mixed)) in order.iter().zip(mixed).enumerate() {
                 let pixel = &pixels[place as usize];
                 let Pixel { edge, background, alpha, .. } = *pixel;
-                let behind = if background.is_some() { 1.0 } else { 1.0 - alpha };
+                let background_alpha = if background.is_some() { 1.0 } else { 1.0 - alpha };
                 let (near_m, far_m) = (edge.near.recip(), edge.far.recip());
                 let difference = [differences[0][k], differences[1][k], differences[2][k]];
-                *mixed = MixedPixel { at: pixel.index(width) as u32, near_m, far_m, alpha, behind, difference };
+                *mixed =
+                    MixedPixel { at: pixel.index(width) as u32, near_m, far_m, alpha, background_alpha, difference };
             }
         }
     }

@@ -7,9 +7,9 @@ use pulp::WithSimd;
 
 use super::tiles::Tiles;
 
-/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels.
+/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels; the first is the edge pixel itself.
 pub const BAND_PX: usize = 4;
-/// Width of the band beside an edge pixel, which is itself the first pixel of it.
+/// Distance that the band reaches from its edge pixel.
 const SIDE_PX: usize = BAND_PX - 1;
 
 /// Marks the pixels within [`BAND_PX`] of an edge along the rows of a band.

@@ -38,7 +38,7 @@ use crate::compute::thread_pool::ThreadPool;
 #[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
-use crate::frame::fit::Fit;
+use crate::frame::fit::Letterbox;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 
@@ -88,7 +88,7 @@ pub struct Refiner {
     outlines: Outlines,
     /// The downsampled picture.
     reduced: ColorImage,
-    fit: Fit,
+    fit: Letterbox,
     /// Refines instead of the CPU, until the device fails.
     #[cfg(feature = "gpu")]
     gpu: WithFallback<Option<gpu::GpuRefiner>>,

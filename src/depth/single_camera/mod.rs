@@ -164,7 +164,7 @@ fn run_depth_network(
 ) {
     let outcome = relative_depth.as_mut().map(|relative_depth| match due {
         DueNetworks { depth: false, .. } => relative_depth.collect(false),
-        DueNetworks { in_background: true, .. } => relative_depth.run_async(color, mask),
+        DueNetworks { in_background: true, .. } => relative_depth.submit(color, mask),
         DueNetworks { in_background: false, .. } => relative_depth.run(color, mask),
     });
     if let Some(Err(why)) = outcome {

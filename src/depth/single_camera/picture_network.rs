@@ -1,7 +1,7 @@
 //! Feeds pictures to a network: input layout and scaling, and the selection of its output.
 
 use crate::frame::ColorImage;
-use crate::frame::scale::Scale;
+use crate::frame::scale::RowScaler;
 use crate::network::{LoadedNetwork, Network, Port, Scaling, Task, Tensor};
 
 /// Maximum side of a network's input picture, in pixels.
@@ -32,7 +32,7 @@ pub struct PictureNetwork {
     recurrent_states: Vec<(usize, usize)>,
     inputs: Vec<Tensor>,
     outputs: Vec<Tensor>,
-    scale: Scale,
+    scale: RowScaler,
     row: Vec<u16>,
     scaled: Vec<u8>,
 }
@@ -128,7 +128,7 @@ impl PictureNetwork {
             recurrent_states,
             inputs,
             outputs: Vec::new(),
-            scale: Scale::default(),
+            scale: RowScaler::default(),
             row: Vec::new(),
             scaled: Vec::new(),
         })
@@ -170,13 +170,13 @@ impl PictureNetwork {
     /// Sets the input picture for [`Self::run`].
     pub fn set_picture(&mut self, color: &ColorImage) {
         let (width, height) = self.size;
-        self.scale.adapt((color.width as usize, color.height as usize), self.size);
+        self.scale.set_sizes((color.width as usize, color.height as usize), self.size);
         self.scaled.resize(3 * width, 0);
         let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
         let factor = self.scaling.divisor.map(f32::recip);
         let values = &mut self.inputs[self.picture].values;
         for y in 0..height {
-            self.scale.row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
+            self.scale.scale_row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
             for (x, pixel) in self.scaled.as_chunks::<3>().0.iter().enumerate() {
                 for c in 0..3 {
                     let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };

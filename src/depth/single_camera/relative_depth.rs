@@ -100,7 +100,7 @@ impl RelativeDepth {
     ///
     /// # Errors
     /// See [`PictureNetwork::infer`].
-    pub fn run_async(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
+    pub fn submit(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
         if self.map.nearness.is_empty() {
             return self.run(color, mask);
         }

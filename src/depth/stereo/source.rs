@@ -86,7 +86,7 @@ impl StereoDepth {
     }
 
     /// Checks a pair and its range of disparities, unless an earlier check was conclusive.
-    fn check_pair(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
+    fn check_rectification_and_range(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
         if self.checks_left == 0 {
             return Ok(());
         }
@@ -170,7 +170,7 @@ impl DepthSource for StereoDepth {
             }
             None => Some(right),
         };
-        self.check_pair(rectified)?;
+        self.check_rectification_and_range(rectified)?;
         let pair = Pair { left: &self.left, color: Some(seen.color), right: rectified.unwrap_or(&self.right) };
         self.matcher.compute_disparity(pair, &mut self.disparity)?;
         disparity_to_depth(&self.disparity, &self.rig, map);

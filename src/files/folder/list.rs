@@ -8,8 +8,8 @@ use std::path::{Component, Path, PathBuf};
 
 use rustix::fs::OFlags;
 
-use super::{FolderError, LIST};
-use crate::files::{input, whole};
+use super::{FolderError, LIST_NAME};
+use crate::files::{atomic_file, input};
 
 /// A list that is being written.
 #[derive(Debug)]
@@ -23,18 +23,18 @@ pub(super) struct List {
 impl List {
     /// Creates a new list in `folder`; replaces an old one, whose files are gone.
     pub(super) fn create(folder: &Path) -> Result<Self, FolderError> {
-        let path = folder.join(LIST);
+        let path = folder.join(LIST_NAME);
         let removed = match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
             _ => Ok(()),
         };
-        let file = removed.and_then(|()| File::create_new(&path)).map_err(FolderError::write(&path))?;
+        let file = removed.and_then(|()| File::create_new(&path)).map_err(FolderError::cannot_write(&path))?;
         Ok(Self { path, file, bytes: 0, len: 0 })
     }
 
     /// Opens the list of `folder` for appending; creates it if needed. Does not follow links.
     pub(super) fn open(folder: &Path) -> Result<Self, FolderError> {
-        let path = folder.join(LIST);
+        let path = folder.join(LIST_NAME);
         let mut options = File::options();
         options.append(true).create(true).custom_flags(OFlags::NOFOLLOW.bits() as i32);
         let opened = options.open(&path).and_then(|mut file| {
@@ -42,7 +42,7 @@ impl List {
             file.write_all(b"\n")?;
             Ok((file.metadata()?.len(), file))
         });
-        let (bytes, file) = opened.map_err(FolderError::write(&path))?;
+        let (bytes, file) = opened.map_err(FolderError::cannot_write(&path))?;
         Ok(Self { path, file, bytes, len: 0 })
     }
 
@@ -88,13 +88,13 @@ impl Names {
 
 /// Reads the names on the list of `folder`; empty without a list. Skips names outside the folder or more than one
 /// folder deep.
-pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
-    let path = folder.join(LIST);
+pub(super) fn read_names(folder: &Path) -> Result<Names, FolderError> {
+    let path = folder.join(LIST_NAME);
     // Do not follow a link: it could lead to another folder's list.
     if !fs::symlink_metadata(&path).is_ok_and(|there| there.is_file()) {
         return Ok(Names::default());
     }
-    let text = input::read_text(&path, input::MAX_TEXT_BYTES).map_err(FolderError::write(&path))?;
+    let text = input::read_text(&path, input::MAX_TEXT_BYTES).map_err(FolderError::cannot_write(&path))?;
     let ordered: Vec<String> = text.lines().filter(|name| is_within(name)).map(str::to_owned).collect();
     let all = ordered.iter().cloned().collect();
     Ok(Names { ordered, all })
@@ -105,17 +105,17 @@ pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
 ///
 /// # Errors
 /// The list cannot be read or written.
-pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(), FolderError> {
-    let known = read(folder)?;
+pub fn adopt_files(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(), FolderError> {
+    let known = read_names(folder)?;
     let mut seen = HashSet::new();
     let new = names.into_iter().filter(|name| is_within(name) && !known.contains(name));
     let lines: String = new.filter(|name| seen.insert(name.clone())).map(|name| name + "\n").collect();
     if lines.is_empty() {
         return Ok(());
     }
-    let path = folder.join(LIST);
+    let path = folder.join(LIST_NAME);
     let list = known.ordered.iter().map(|name| format!("{name}\n")).collect::<String>() + &lines;
-    whole::write(&path, list.as_bytes(), true).map_err(FolderError::write(&path))
+    atomic_file::write(&path, list.as_bytes(), true).map_err(FolderError::cannot_write(&path))
 }
 
 /// Returns whether a name is a plain path of at most one folder and a file that is not hidden.

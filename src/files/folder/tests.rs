@@ -3,9 +3,9 @@ use std::os::unix::fs::symlink;
 
 use super::*;
 
-const SET: Set = Set {
+const SET: FileSet = FileSet {
     subfolders: &["rgb"],
-    has: &|name| name.ends_with(".png") && name.bytes().any(|byte| byte.is_ascii_digit()) || name == "rgb.txt",
+    contains: &|name| name.ends_with(".png") && name.bytes().any(|byte| byte.is_ascii_digit()) || name == "rgb.txt",
 };
 
 fn open(path: &Path) -> Result<Folder, FolderError> {
@@ -13,9 +13,9 @@ fn open(path: &Path) -> Result<Folder, FolderError> {
 }
 
 fn put(folder: &mut Folder, name: &str, text: &str) {
-    let part = folder.begin(name).unwrap();
+    let part = folder.create_file(name).unwrap();
     part.file().write_all(text.as_bytes()).unwrap();
-    folder.put(part).unwrap();
+    folder.commit_file(part).unwrap();
 }
 
 /// Returns all files as `name=content`, including subfolders, sorted, without our own list.
@@ -25,7 +25,7 @@ fn all(path: &Path) -> Vec<String> {
         let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
         match entry.is_dir() {
             true => found.extend(all(&entry).into_iter().map(|file| format!("{name}/{file}"))),
-            false if name == LIST => {}
+            false if name == LIST_NAME => {}
             false => found.push(format!("{name}={}", fs::read_to_string(&entry).unwrap_or_default())),
         }
     }
@@ -48,7 +48,7 @@ fn files_go_into_an_empty_folder_as_they_come() {
     assert_eq!(all(&path), ["0.png=zero"]);
     assert!(matches!(Folder::open(&path, true, &SET), Err(FolderError::Busy { .. })), "one run at a time");
     put(&mut folder, "rgb/0.png", "deep");
-    assert_eq!((folder.files(), folder.finish().unwrap()), (2, 0));
+    assert_eq!((folder.file_count(), folder.finish().unwrap()), (2, 0));
     assert_eq!(all(&path), ["0.png=zero", "rgb/0.png=deep"]);
     assert!(matches!(Folder::open(&path, false, &SET), Err(FolderError::NotEmpty { .. })));
 
@@ -69,7 +69,7 @@ fn what_was_there_stays_until_the_new_is_whole() {
     let before = all(&path);
 
     let mut folder = open(&path).unwrap();
-    assert!(folder.replaces());
+    assert!(folder.is_replacing());
     put(&mut folder, "0.png", "new");
     let hidden = |files: &[String]| files.iter().filter(|file| !file.starts_with('.')).cloned().collect::<Vec<_>>();
     assert_eq!(hidden(&all(&path)), before);
@@ -80,10 +80,10 @@ fn what_was_there_stays_until_the_new_is_whole() {
 
     let mut folder = open(&path).unwrap();
     put(&mut folder, "0.png", "cut");
-    assert_eq!(folder.cut().unwrap(), Some(dir.path().join("out.incomplete")));
+    assert_eq!(folder.finish_incomplete().unwrap(), Some(dir.path().join("out.incomplete")));
     assert_eq!(all(&path), ["0.png=new", "7.png=new", "holiday.png=mine", "notes.txt=mine"]);
     assert_eq!(all(&dir.path().join("out.incomplete")), ["0.png=cut"]);
-    assert_eq!(open(&path).unwrap().cut().unwrap(), None, "nothing is kept of nothing");
+    assert_eq!(open(&path).unwrap().finish_incomplete().unwrap(), None, "nothing is kept of nothing");
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 
@@ -116,10 +116,10 @@ fn foreign_files_are_refused_and_never_touched() {
     let elsewhere = other.join("4.png");
     fs::write(&elsewhere, "mine").unwrap();
     let names = format!("0.png\n../other/3.png\n{}\nrgb/3.png\n..\n.hidden\n\n", elsewhere.display());
-    fs::write(path.join(LIST), names).unwrap();
+    fs::write(path.join(LIST_NAME), names).unwrap();
     symlink(&other, path.join("rgb")).unwrap();
     assert!(matches!(open(&path), Err(FolderError::Foreign { .. })), "it would be written through a link");
-    let plain = Set { subfolders: &[], has: SET.has };
+    let plain = FileSet { subfolders: &[], contains: SET.contains };
     assert_eq!(Folder::open(&path, true, &plain).unwrap().finish().unwrap(), 1);
     assert_eq!(all(&other), ["3.png=mine", "4.png=mine"]);
 }
@@ -135,7 +135,7 @@ fn a_folder_that_goes_meanwhile_is_not_made_anew() {
         if again {
             fs::create_dir(&path).unwrap();
         }
-        assert!(matches!(folder.begin("1.png"), Err(FolderError::Gone { .. })));
+        assert!(matches!(folder.create_file("1.png"), Err(FolderError::Gone { .. })));
     }
 }
 
@@ -148,23 +148,23 @@ fn what_a_killed_run_left_is_kept_or_done_with() {
         let folder = path.join(folder);
         fs::create_dir(&folder).unwrap();
         files.iter().for_each(|name| fs::write(folder.join(name), "new").unwrap());
-        fs::write(folder.join(LIST), names).unwrap();
+        fs::write(folder.join(LIST_NAME), names).unwrap();
     };
     // Killed while writing.
-    leave(PART, &["0.png"], "0.png\n");
+    leave(STAGING_NAME, &["0.png"], "0.png\n");
     fs::write(path.join(".1.png.77-0.part"), "half").unwrap();
     fs::write(path.join(".mine.77-0.part"), "half").unwrap();
     drop(open(&path).unwrap());
     assert_eq!(all(&path), [".mine.77-0.part=half", "0.png=old", "1.png=old"]);
     assert_eq!(all(&dir.path().join("out.incomplete")), ["0.png=new"]);
     // Killed before anything was written.
-    leave(PART, &[], "");
+    leave(STAGING_NAME, &[], "");
     drop(open(&path).unwrap());
     assert!(!dir.path().join("out.incomplete.2").exists());
     // Killed while moving files: two of three are in place, and ours.
     ["0.png", "2.png"].iter().for_each(|name| fs::write(path.join(name), "new").unwrap());
     list::List::open(&path).unwrap().add("2.png").unwrap();
-    leave(PART, &["3.png"], "0.png\n2.png\n3.png\n");
+    leave(STAGING_NAME, &["3.png"], "0.png\n2.png\n3.png\n");
     drop(open(&path).unwrap());
     assert_eq!(all(&path), [".mine.77-0.part=half", "0.png=new", "1.png=old", "2.png=new"]);
     assert_eq!(all(&dir.path().join("out.incomplete.2")), ["3.png=new"]);

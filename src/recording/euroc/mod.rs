@@ -4,18 +4,18 @@
 
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
+use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder, find_numbered_pictures};
 use super::error::RecordingError;
 use super::fault::LineFault;
-use super::list::{self, Entry, clear_unordered_times, inside, quoted, refuse_faults};
-use super::{Options, Pair, Unpaired, pair, timeline};
+use super::list::{self, Entry, clear_unordered_times, parse_relative_path, quote, refuse_faults};
+use super::{Options, StereoGeometry, Unpaired, pair, timeline};
 use crate::calibration;
 
 /// One folder per camera, with its list.
 pub(super) const LAYOUT: Layout = Layout {
     name: "EuRoC/ASL",
-    looked_for: "mav0/cam0 with data.csv or data",
-    is_in: |dir| CAMERAS.iter().any(|[left, _]| left.is_in(dir)),
+    expected_files: "mav0/cam0 with data.csv or data",
+    matches_folder: |dir| CAMERAS.iter().any(|[left, _]| left.exists_in(dir)),
     open,
 };
 
@@ -39,22 +39,22 @@ const CAMERAS: [[Camera; 2]; 2] = [
 ];
 
 impl Camera {
-    fn is_in(&self, dir: &Path) -> bool {
+    fn exists_in(&self, dir: &Path) -> bool {
         dir.join(self.list).exists() || dir.join(self.pictures).is_dir()
     }
 
     /// Reads the camera's pictures with their times, from its list or else from the file names.
     fn read(&self, dir: &Path, options: &Options) -> Result<Vec<Entry>, RecordingError> {
         let mut entries = match dir.join(self.list).exists() {
-            true => list::read(dir, self.list, |place, text| {
+            true => list::read_list(dir, self.list, |position, text| {
                 let columns = text.map(|text| text.split(',').map(str::trim).collect::<Vec<_>>());
                 match columns.as_deref() {
-                    Ok(&[time, file]) => Entry::new(place, parse_ns(time), self.picture(file)),
-                    Ok(columns) => {
-                        let fault = LineFault::Columns { expected: "nanoseconds,file", found: columns.len() };
-                        Entry::new(place, Err(fault.clone()), Err(fault))
+                    Ok(&[time, file]) => Entry::new(position, parse_ns(time), self.picture(file)),
+                    Ok(split_columns) => {
+                        let fault = LineFault::Columns { expected: "nanoseconds,file", found: split_columns.len() };
+                        Entry::new(position, Err(fault.clone()), Err(fault))
                     }
-                    Err(fault) => Entry::new(place, Err(fault.clone()), Err(fault.clone())),
+                    Err(fault) => Entry::new(position, Err(fault.clone()), Err(fault.clone())),
                 }
             })?,
             false => self.entries_by_name(dir)?,
@@ -68,47 +68,56 @@ impl Camera {
 
     /// Returns entries for the pictures whose names are times in nanoseconds; skips others.
     fn entries_by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
-        let names = numbered_pictures(&dir.join(self.pictures))?;
+        let names = find_numbered_pictures(&dir.join(self.pictures))?;
         let entry = |name: String| {
             let time_ns = parse_ns(name.split('.').next()?).ok()?;
-            Some(Entry { time_ns: Some(time_ns), source: Source::found(Path::new(self.pictures).join(name)) })
+            Some(Entry {
+                time_ns: Some(time_ns),
+                source: PictureSource::from_path(Path::new(self.pictures).join(name)),
+            })
         };
         Ok(names.into_iter().filter_map(entry).collect())
     }
 
     fn picture(&self, file: &str) -> Result<PathBuf, LineFault> {
-        inside(file).map(|file| Path::new(self.pictures).join(file))
+        parse_relative_path(file).map(|file| Path::new(self.pictures).join(file))
     }
 }
 
 /// Pairs the pictures of the two cameras by time, and reads their calibration. A left camera alone yields no pair.
-fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
-    let [left, right] = CAMERAS.iter().find(|[left, _]| left.is_in(dir)).unwrap_or(&CAMERAS[0]);
-    let frame = |left: Entry, right| Listed { time_ns: left.time_ns, color: left.source, right, depth: None };
+    let [left, right] = CAMERAS.iter().find(|[left, _]| left.exists_in(dir)).unwrap_or(&CAMERAS[0]);
+    let frame = |left: Entry, right| ListedFrame { time_ns: left.time_ns, color: left.source, right, depth: None };
     let entries = left.read(dir, options)?;
-    if !right.is_in(dir) {
+    if !right.exists_in(dir) {
         let frames = entries.into_iter().map(|left| frame(left, None)).collect();
-        return Ok(Contents { frames, depth: None, pair: None, disparities: None, unpaired: Unpaired::default() });
+        return Ok(Contents {
+            frames,
+            depth: None,
+            stereo_geometry: None,
+            disparity_count: None,
+            unpaired: Unpaired::default(),
+        });
     }
     // A right picture more than half a period away belongs to another left one, which may be missing.
     let half_period_ns = timeline::median_period_ns(entries.iter().filter_map(|entry| entry.time_ns)) / 2;
     let tolerance_ns = options.pair_tolerance_ns.min(half_period_ns);
     let paired = pair::pair_by_time(entries, right.read(dir, options)?, tolerance_ns);
     if paired.frames.iter().all(|(_, right)| right.is_none()) {
-        return Err(RecordingError::NoEyePairs { dir: dir.clone(), tolerance_ns });
+        return Err(RecordingError::NoStereoPairs { dir: dir.clone(), tolerance_ns });
     }
     let sensors = [left, right].map(|camera| dir.join(camera.sensor));
-    let pair = match sensors.iter().any(|sensor| sensor.exists()) {
-        true => Pair::Raw(Box::new(calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
-        false => Pair::Unstated,
+    let stereo_geometry = match sensors.iter().any(|sensor| sensor.exists()) {
+        true => StereoGeometry::Raw(Box::new(calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
+        false => StereoGeometry::Uncalibrated,
     };
     Ok(Contents {
         frames: paired.frames.into_iter().map(|(left, right)| frame(left, right)).collect(),
         depth: None,
-        pair: Some(pair),
-        disparities: None,
-        unpaired: Unpaired { color: paired.left_over, right: paired.others_left_over, ..Unpaired::default() },
+        stereo_geometry: Some(stereo_geometry),
+        disparity_count: None,
+        unpaired: Unpaired { color: paired.unpaired, right: paired.unpaired_others, ..Unpaired::default() },
     })
 }
 
@@ -116,5 +125,5 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
     // `parse` alone would accept a sign.
     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
-    text.parse().ok().filter(|_| is_number).ok_or_else(|| LineFault::Nanoseconds(quoted(text)))
+    text.parse().ok().filter(|_| is_number).ok_or_else(|| LineFault::Nanoseconds(quote(text)))
 }

@@ -2,7 +2,7 @@
 //! `P_rect_00:` and so on. Four rows without keys are P0 to P3; fewer are the left and the right camera.
 
 use crate::recording::fault::GeometryFault;
-use crate::recording::geometry::{Geometry, GeometryError, numbers, rig};
+use crate::recording::geometry::{Geometry, GeometryError, create_rig, parse_numbers};
 
 /// A camera's projection matrix: `P[0]` is the focal length and `P[2]` the column of the principal point, both in
 /// pixels; `P[3]` is minus the focal length times the camera's offset to the right in metres.
@@ -39,8 +39,8 @@ pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geo
     };
     let ((_, left), (line, right)) = (projection_of(left)?, projection_of(left + 1)?);
     let baseline_m = (left[3] - right[3]) / left[0];
-    let rig = rig([left[0], right[0]], right[2] - left[2], baseline_m).map_err(|fault| (Some(line), fault))?;
-    Ok(Geometry { rig, size: None, disparities: None })
+    let rig = create_rig([left[0], right[0]], right[2] - left[2], baseline_m).map_err(|fault| (Some(line), fault))?;
+    Ok(Geometry { rig, size: None, disparity_count: None })
 }
 
 /// Parses the projection matrix in a line; `None` if the line is something else.
@@ -54,7 +54,7 @@ fn parse_row(line: u32, text: &str) -> Option<Row> {
     if camera.is_none() && !(key.is_empty() && starts_with_number) {
         return None;
     }
-    let projection = numbers(values).filter(|projection: &Projection| projection[0] > 0.0);
+    let projection = parse_numbers(values).filter(|projection: &Projection| projection[0] > 0.0);
     let fault = || GeometryFault::Value {
         key: if key.is_empty() { "the row".to_owned() } else { key.to_owned() },
         expected: "a projection: 12 numbers, the first of them > 0",

@@ -7,15 +7,19 @@ mod times;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
+use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder, find_numbered_pictures};
 use super::error::RecordingError;
 use super::geometry::Geometry;
 use super::list::{clear_unordered_times, refuse_faults};
-use super::{Options, Pair, Unpaired};
+use super::{Options, StereoGeometry, Unpaired};
 
 /// Detected by the folders of the two cameras.
-pub(super) const LAYOUT: Layout =
-    Layout { name: "KITTI", looked_for: "image_2 and image_3, or image_0 and image_1", is_in, open };
+pub(super) const LAYOUT: Layout = Layout {
+    name: "KITTI",
+    expected_files: "image_2 and image_3, or image_0 and image_1",
+    matches_folder: is_kitti_folder,
+    open,
+};
 
 /// The folders of the two cameras.
 struct FolderPair {
@@ -37,22 +41,22 @@ const FOLDER_PAIRS: [FolderPair; 6] = [
 
 const CALIBRATIONS: [&str; 2] = ["calib.txt", "calib_cam_to_cam.txt"];
 
-fn is_in(dir: &Path) -> bool {
+fn is_kitti_folder(dir: &Path) -> bool {
     FOLDER_PAIRS.iter().any(|folders| dir.join(folders.left).is_dir())
 }
 
 /// Returns the number of the left camera whose folder contains the picture `left`.
-pub(super) fn camera_of(left: &Path) -> Option<usize> {
+pub(super) fn find_left_camera(left: &Path) -> Option<usize> {
     let folder = left.parent()?;
     FOLDER_PAIRS.iter().find(|folders| folder.ends_with(folders.left))?.camera
 }
 
 /// Lists the pictures of both cameras with their times, and reads the calibration.
-fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
-    let folders = find_folders(dir)?;
-    let names = numbered_pictures(&dir.join(folders.left))?;
-    let right_names: HashSet<String> = numbered_pictures(&dir.join(folders.right))?.into_iter().collect();
+    let folders = find_folder_pair(dir)?;
+    let names = find_numbered_pictures(&dir.join(folders.left))?;
+    let right_names: HashSet<String> = find_numbered_pictures(&dir.join(folders.right))?.into_iter().collect();
     let known_names: HashSet<&String> = names.iter().collect();
     let right_alone: Vec<_> = right_names.iter().filter(|name| !known_names.contains(name)).collect();
     if !options.keep_going {
@@ -73,29 +77,31 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     if !options.keep_going {
         refuse_faults(dir, entries.iter())?;
     }
-    let frames = entries.into_iter().zip(&names).map(|(left, name)| Listed {
+    let frames = entries.into_iter().zip(&names).map(|(left, name)| ListedFrame {
         time_ns: left.time_ns,
         // `times.txt` does not name pictures: its line is cited only if the time itself is faulty.
-        color: Source { place: left.source.place.filter(|_| left.source.file.is_err()), ..left.source },
-        right: Some(Source::found(Path::new(folders.right).join(name))),
+        color: PictureSource { position: left.source.position.filter(|_| left.source.file.is_err()), ..left.source },
+        right: Some(PictureSource::from_path(Path::new(folders.right).join(name))),
         depth: None,
     });
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
-    let pair = match calibration {
-        Some(path) => Pair::Rectified(Geometry::read_as(&path, |text| calib::parse(text, folders.camera))?.rig),
-        None => Pair::Unstated,
+    let stereo_geometry = match calibration {
+        Some(path) => {
+            StereoGeometry::Rectified(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig)
+        }
+        None => StereoGeometry::Uncalibrated,
     };
     Ok(Contents {
         frames: frames.collect(),
         depth: None,
-        pair: Some(pair),
-        disparities: None,
+        stereo_geometry: Some(stereo_geometry),
+        disparity_count: None,
         unpaired: Unpaired { right: right_alone.len(), ..Unpaired::default() },
     })
 }
 
 /// Returns the first pair of folders that both exist.
-fn find_folders(dir: &Path) -> Result<&'static FolderPair, RecordingError> {
+fn find_folder_pair(dir: &Path) -> Result<&'static FolderPair, RecordingError> {
     let has = |eye: &str| dir.join(eye).is_dir();
     if let Some(folders) = FOLDER_PAIRS.iter().find(|folders| has(folders.left) && has(folders.right)) {
         return Ok(folders);

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::recording::Options;
-use crate::recording::contents::Source;
+use crate::recording::contents::PictureSource;
 use crate::recording::error::RecordingError;
 use crate::recording::fault::LineFault;
-use crate::recording::list::{self, Entry, quoted};
+use crate::recording::list::{self, Entry, quote};
 
 const LIST: &str = "times.txt";
 
@@ -30,16 +30,16 @@ pub(super) fn timed_entries(
     if !dir.join(LIST).exists() {
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
             time_ns: Some(index * PERIOD_NS),
-            source: Source::found(file),
+            source: PictureSource::from_path(file),
         };
         return Ok((0..).zip(pictures).map(entry).collect());
     }
-    let times = list::read(dir, LIST, |place, text| (place, text.and_then(parse_ns)))?;
+    let times = list::read_list(dir, LIST, |position, text| (position, text.and_then(parse_ns)))?;
     let entries = pictures.into_iter().enumerate().map(|(index, (name, file))| {
         let number = name.split('.').next().and_then(|stem| stem.parse().ok()).unwrap_or(index);
         match times.get(number) {
-            Some((place, time_ns)) => Ok(Entry::new(*place, time_ns.clone(), Ok(file))),
-            None if options.keep_going => Ok(Entry { time_ns: None, source: Source::found(file) }),
+            Some((position, time_ns)) => Ok(Entry::new(*position, time_ns.clone(), Ok(file))),
+            None if options.keep_going => Ok(Entry { time_ns: None, source: PictureSource::from_path(file) }),
             None => Err(RecordingError::TooFewTimes {
                 list: dir.join(LIST),
                 times: times.len(),
@@ -54,7 +54,7 @@ pub(super) fn timed_entries(
 /// enough, as times count from the first picture.
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
     let seconds = text.parse().ok().filter(|seconds| (0.0..LAST_S).contains(seconds));
-    seconds.map(|seconds: f64| (seconds * 1e9).round() as u64).ok_or_else(|| LineFault::Time(quoted(text)))
+    seconds.map(|seconds: f64| (seconds * 1e9).round() as u64).ok_or_else(|| LineFault::Time(quote(text)))
 }
 
 #[cfg(test)]

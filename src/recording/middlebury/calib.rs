@@ -4,7 +4,7 @@
 
 use crate::recording::MAX_SIDE_PX;
 use crate::recording::fault::GeometryFault;
-use crate::recording::geometry::{Geometry, GeometryError, numbers, rig};
+use crate::recording::geometry::{Geometry, GeometryError, create_rig, parse_numbers};
 
 const MM_PER_M: f64 = 1000.0;
 
@@ -31,7 +31,7 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, GeometryError>
     let missing = |key: &str| (None, GeometryFault::Missing(key.to_owned()));
     let number = |key: &str| match find(key) {
         None => Ok(None),
-        Some((line, value)) => match numbers(value) {
+        Some((line, value)) => match parse_numbers(value) {
             Some([number]) => Ok(Some((line, number))),
             None => Err(wrong(line, key, "a number", value)),
         },
@@ -45,7 +45,7 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, GeometryError>
     };
     let camera = |key: &str| match find(key) {
         None => Ok(None),
-        Some((line, value)) => match numbers::<9>(value).filter(|matrix| matrix[0] > 0.0) {
+        Some((line, value)) => match parse_numbers::<9>(value).filter(|matrix| matrix[0] > 0.0) {
             Some(matrix) => Ok(Some((line, matrix[0], matrix[2]))),
             None => Err(wrong(line, key, "`[f 0 cx; 0 f cy; 0 0 1]` with f > 0", value)),
         },
@@ -62,12 +62,12 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, GeometryError>
     let (baseline_line, baseline_mm) = number("baseline")?.ok_or_else(|| missing("baseline"))?;
     let size = pixels("width")?.zip(pixels("height")?);
     let bound = size.map_or(MAX_SIDE_PX, |(width, _)| width);
-    let disparities = pixels("ndisp")?.filter(|&count| count < bound).map(|count| count.next_multiple_of(16));
-    let rig = rig([left_px, right_px], doffs_px, baseline_mm / MM_PER_M).map_err(|fault| match fault {
+    let disparity_count = pixels("ndisp")?.filter(|&count| count < bound).map(|count| count.next_multiple_of(16));
+    let rig = create_rig([left_px, right_px], doffs_px, baseline_mm / MM_PER_M).map_err(|fault| match fault {
         GeometryFault::UnequalFocal(..) => (Some(right_line), fault),
         fault => (Some(baseline_line), fault),
     })?;
-    Ok(Geometry { rig, size, disparities })
+    Ok(Geometry { rig, size, disparity_count })
 }
 
 #[cfg(test)]
@@ -81,11 +81,11 @@ mod tests {
     fn a_calibration_is_read() {
         let read = parse(GOOD).unwrap();
         assert_eq!((read.rig.focal_px, read.rig.baseline_m, read.rig.doffs_px), (994.978, 0.193_001, 31.086));
-        assert_eq!((read.size, read.disparities, read.rig.metric), (Some((741, 497)), Some(80), true));
+        assert_eq!((read.size, read.disparity_count, read.rig.metric), (Some((741, 497)), Some(80), true));
         // Without doffs, it follows from the cameras.
         assert_eq!(parse(&GOOD.replace("doffs", "#doffs")).unwrap().rig.doffs_px, 31.086);
         // ETH3D: the width as ndisp.
-        assert_eq!(parse(&GOOD.replace("ndisp=70", "ndisp=741")).unwrap().disparities, None);
+        assert_eq!(parse(&GOOD.replace("ndisp=70", "ndisp=741")).unwrap().disparity_count, None);
         assert_eq!(parse(&GOOD.replace("width", "w")).unwrap().size, None);
     }
 

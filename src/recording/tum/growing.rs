@@ -4,15 +4,15 @@ use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use crate::files::atomic_file::{self, PartFile};
 use crate::files::folder::{self, Folder};
 use crate::files::input;
-use crate::files::whole::{self, Part};
 use crate::recording::error::RecordingError;
-use crate::recording::list::lines;
+use crate::recording::list::split_lines;
 
 /// A list under construction. Each line is written at once, so that it survives if the process is killed.
 pub(super) struct GrowingList {
-    part: Part,
+    part: PartFile,
     /// Length of all complete lines, in bytes.
     bytes: u64,
     /// Length without the last line.
@@ -22,7 +22,7 @@ pub(super) struct GrowingList {
 impl GrowingList {
     /// Creates a list with this final name, and writes `head` as its first lines.
     pub(super) fn create(folder: &Folder, name: &str, head: &str) -> Result<Self, RecordingError> {
-        let part = folder.begin(name)?;
+        let part = folder.create_file(name)?;
         part.file().write_all(head.as_bytes()).map_err(RecordingError::io("write", part.path()))?;
         let bytes = head.len() as u64;
         Ok(Self { part, bytes, bytes_before_last: bytes })
@@ -52,26 +52,26 @@ impl GrowingList {
     }
 
     /// Renames the list to its final name.
-    pub(super) fn put(self, folder: &mut Folder) -> Result<(), RecordingError> {
-        Ok(folder.put(self.part)?)
+    pub(super) fn commit(self, folder: &mut Folder) -> Result<(), RecordingError> {
+        Ok(folder.commit_file(self.part)?)
     }
 
     /// Completes lists that a killed process left unfinished: lists of `names` in `dir` that have entries, and whose
     /// final name is free, are truncated to complete lines and renamed.
-    pub(super) fn rescue(dir: &Path, names: &[&str]) -> Result<(), RecordingError> {
-        // A recording that would have replaced another one is in `PART`.
-        for folder in [dir.to_owned(), dir.join(folder::PART)] {
+    pub(super) fn recover_interrupted(dir: &Path, names: &[&str]) -> Result<(), RecordingError> {
+        // A recording that would have replaced another one is in `STAGING_NAME`.
+        for folder in [dir.to_owned(), dir.join(folder::STAGING_NAME)] {
             for name in names {
                 let list = folder.join(name);
                 // If the folder is missing, there is nothing to rescue.
-                for part in whole::left_behind(&list).unwrap_or_default() {
+                for part in atomic_file::find_abandoned(&list).unwrap_or_default() {
                     let is_taken = list.symlink_metadata().is_ok();
                     if is_taken || !truncate_partial_line(&part).map_err(RecordingError::io("complete", &part))? {
                         continue;
                     }
-                    whole::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
+                    atomic_file::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
                     // Marks the list as ours for later runs.
-                    folder::adopt(&folder, [(*name).to_owned()])?;
+                    folder::adopt_files(&folder, [(*name).to_owned()])?;
                     tracing::warn!("{}: restored from an interrupted recording", list.display());
                 }
             }
@@ -87,5 +87,5 @@ fn truncate_partial_line(list: &Path) -> io::Result<bool> {
     let file = OpenOptions::new().write(true).open(list)?;
     file.set_len(whole_lines.len() as u64)?;
     file.sync_all()?;
-    Ok(lines(whole_lines).next().is_some())
+    Ok(split_lines(whole_lines).next().is_some())
 }

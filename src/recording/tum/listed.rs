@@ -9,20 +9,20 @@ use crate::recording::list::Entry;
 const LISTS: [&str; 3] = [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS];
 
 /// Returns the lists that exist.
-pub(super) fn lists(dir: &Path) -> impl Iterator<Item = String> {
+pub(super) fn find_lists(dir: &Path) -> impl Iterator<Item = String> {
     LISTS.into_iter().filter(|list| is_file(&dir.join(list))).map(str::to_owned)
 }
 
 /// Returns the PNG and JPEG pictures that the lists name and that exist, at most one folder deep. Skips faulty lists
 /// and lines: pictures not found here are kept.
-pub(super) fn pictures(dir: &Path) -> impl Iterator<Item = String> {
+pub(super) fn find_pictures(dir: &Path) -> impl Iterator<Item = String> {
     let entries = |list: &'static str| -> Vec<Entry> {
         if !is_file(&dir.join(list)) {
             return Vec::new();
         }
         match list {
             ASSOCIATIONS => list::read_pairs(dir, list).unwrap_or_default().into_iter().flatten().collect(),
-            list => list::read(dir, list).unwrap_or_default(),
+            list => list::read_list(dir, list).unwrap_or_default(),
         }
     };
     let named = LISTS.into_iter().flat_map(entries).filter_map(|entry| entry.source.file.ok());

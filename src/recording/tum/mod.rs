@@ -13,11 +13,15 @@ mod time;
 mod writer;
 
 use super::contents::Layout;
-pub use writer::{Writer, WriterOptions, Written};
+pub use writer::{RecordingSummary, Writer, WriterOptions};
 
 /// Lists of colour pictures and depth maps.
-pub(super) const LAYOUT: Layout =
-    Layout { name: "TUM RGB-D", looked_for: "associations.txt or rgb.txt", is_in: open::is_in, open: open::open };
+pub(super) const LAYOUT: Layout = Layout {
+    name: "TUM RGB-D",
+    expected_files: "associations.txt or rgb.txt",
+    matches_folder: open::is_tum_folder,
+    open: open::open,
+};
 
 /// Units per metre of the benchmark's depth pictures.
 pub(super) const DEPTH_SCALE: f32 = 5000.0;

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::DepthUnit;
-use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Locator, Source};
-use crate::recording::decode::{self, DepthUnits, Kind};
+use crate::recording::contents::{Contents, DepthFormat, ListedFrame, Locator, PictureSource, RecordingFolder};
+use crate::recording::decode::{self, DepthUnits, PictureKind};
 use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
 use crate::recording::{Options, Unpaired, pair};
@@ -15,12 +15,12 @@ use crate::recording::{Options, Unpaired, pair};
 const MAX_PICTURES: usize = 1000;
 
 /// Returns whether `dir` has a list of this layout.
-pub(super) fn is_in(dir: &Path) -> bool {
+pub(super) fn is_tum_folder(dir: &Path) -> bool {
     [ASSOCIATIONS, COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists())
 }
 
 /// Reads the lists in `folder`.
-pub(super) fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+pub(super) fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let has = |list: &str| dir.join(list).exists();
     match (has(ASSOCIATIONS), has(COLOR_LIST), has(DEPTH_LIST)) {
@@ -35,7 +35,7 @@ pub(super) fn open(folder: &Folder, options: &Options) -> Result<Contents, Recor
 /// Pairs `rgb.txt` with `depth.txt`, if it exists, by nearest time.
 fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents, RecordingError> {
     let read = |list| {
-        let mut entries = list::read(dir, list)?;
+        let mut entries = list::read_list(dir, list)?;
         clear_unordered_times(entries.iter_mut());
         if !options.keep_going {
             refuse_faults(dir, entries.iter())?;
@@ -51,28 +51,28 @@ fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents
     if paired.frames.iter().all(|(_, depth)| depth.is_none()) {
         return Err(RecordingError::NoPairs { dir: dir.to_owned(), tolerance_ns: options.pair_tolerance_ns });
     }
-    let unpaired = Unpaired { color: paired.left_over, depth: paired.others_left_over, ..Unpaired::default() };
+    let unpaired = Unpaired { color: paired.unpaired, depth: paired.unpaired_others, ..Unpaired::default() };
     let frames = paired.frames.into_iter().map(|(color, depth)| to_frame(color, depth)).collect();
     Ok(to_contents(frames, Some(options), unpaired))
 }
 
-fn to_frame(color: Entry, depth: Option<Source>) -> Listed {
-    Listed { time_ns: color.time_ns, color: color.source, right: None, depth }
+fn to_frame(color: Entry, depth: Option<PictureSource>) -> ListedFrame {
+    ListedFrame { time_ns: color.time_ns, color: color.source, right: None, depth }
 }
 
 /// `depth_options` must be given if the frames have depth.
-fn to_contents(frames: Vec<Listed>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
+fn to_contents(frames: Vec<ListedFrame>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
     let depth = depth_options.map(|options| match options.depth_unit {
         DepthUnit::Metres => {
-            DepthForm::Units(DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid })
+            DepthFormat::Units(DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid })
         }
-        DepthUnit::Inverse { white_is_far } => DepthForm::Inverse { white_is_far },
+        DepthUnit::Inverse { white_is_far } => DepthFormat::Inverse { white_is_far },
     });
-    Contents { frames, depth, pair: None, disparities: None, unpaired }
+    Contents { frames, depth, stereo_geometry: None, disparity_count: None, unpaired }
 }
 
 /// Takes the pairs of `associations.txt` as they are; the colour picture determines the time of a frame.
-fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+fn from_associations(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let mut pairs = list::read_pairs(&folder.dir, ASSOCIATIONS)?;
     if !is_color_first(folder, &pairs)? {
         pairs.iter_mut().for_each(|pair| pair.reverse());
@@ -87,10 +87,10 @@ fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, Rec
 
 /// Returns whether colour is in the first two columns and depth in the last two, decided by a file that another list
 /// names, or else by a pair of pictures of different kinds.
-fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
+fn is_color_first(folder: &RecordingFolder, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
     for (list, is_color) in [(COLOR_LIST, true), (DEPTH_LIST, false)] {
         // The other lists are only a hint here: ignore their faults.
-        let Ok(entries) = list::read(&folder.dir, list) else { continue };
+        let Ok(entries) = list::read_list(&folder.dir, list) else { continue };
         let files: HashSet<_> = entries.iter().filter_map(|entry| entry.source.file.as_ref().ok()).collect();
         let is_listed = |entry: &Entry| entry.source.file.as_ref().is_ok_and(|file| files.contains(file));
         for [first, second] in pairs {
@@ -107,8 +107,8 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
         let [first, second] = pair.each_ref().map(|entry| cached_kind(&mut locator, &entry.source, &mut kinds));
         match (first, second) {
             (first, second) if first == second => {}
-            (Some(Kind::Color), _) | (_, Some(Kind::Depth)) => return Ok(true),
-            (Some(Kind::Depth), _) | (_, Some(Kind::Color)) => return Ok(false),
+            (Some(PictureKind::Color), _) | (_, Some(PictureKind::Depth)) => return Ok(true),
+            (Some(PictureKind::Depth), _) | (_, Some(PictureKind::Color)) => return Ok(false),
             _ => {}
         }
         if kinds.len() > MAX_PICTURES {
@@ -123,10 +123,10 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
 /// Returns the kind of a picture, if readable. Each file is read once and cached in `kinds`.
 fn cached_kind<'a>(
     locator: &mut Locator,
-    source: &'a Source,
-    kinds: &mut HashMap<&'a Path, Option<Kind>>,
-) -> Option<Kind> {
+    source: &'a PictureSource,
+    kinds: &mut HashMap<&'a Path, Option<PictureKind>>,
+) -> Option<PictureKind> {
     let file = source.file.as_deref().ok()?;
-    let look = || decode::header(&locator.locate(source).ok()?).ok().map(|(_, kind)| kind);
+    let look = || decode::read_header(&locator.locate(source).ok()?).ok().map(|(_, kind)| kind);
     *kinds.entry(file).or_insert_with(look)
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::growing::GrowingList;
 use super::time::Seconds;
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, listed};
-use crate::files::folder::{self, Folder, FolderError, Set};
+use crate::files::folder::{self, FileSet, Folder, FolderError};
 use crate::frame::{ColorImage, DepthMap};
 use crate::recording::error::RecordingError;
 use crate::recording::{MAX_SIDE_PX, check_depth_scale, depth_covers, encode};
@@ -15,7 +15,7 @@ const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
 
 /// The files of a recording within its folder.
-const SET: Set = Set { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], has: &is_ours };
+const FILE_SET: FileSet = FileSet { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], contains: &is_recording_file };
 
 /// Options for writing a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ impl Default for WriterOptions {
 ///
 /// The pictures are `rgb/000000.png` (8-bit RGB), `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The lists
 /// are finished last; until then the folder is not a recording. Files of an earlier recording stay until the new one is
-/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::cut`] must end it; otherwise
+/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::finish_incomplete`] must end it; otherwise
 /// there are no lists.
 pub struct Writer {
     dir: PathBuf,
@@ -51,7 +51,7 @@ pub struct Writer {
     last_ns: Option<u64>,
     size: Option<(u32, u32)>,
     /// Number of known depth values, and of those beyond the range of the file.
-    depths: (u64, u64),
+    depth_counts: (u64, u64),
     /// Working memory for encoding: samples of a depth map, and the picture file.
     units: Vec<u8>,
     file: Vec<u8>,
@@ -59,7 +59,7 @@ pub struct Writer {
 
 /// The result of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Written {
+pub struct RecordingSummary {
     /// The folder of the recording.
     pub dir: PathBuf,
     /// The number of frames.
@@ -67,9 +67,9 @@ pub struct Written {
     /// Number of files removed of an earlier recording.
     pub replaced: u64,
     /// Number of known depth values in all frames.
-    pub depths: u64,
+    pub known_depths: u64,
     /// Number of depth values beyond the range of the file, written as unknown.
-    pub too_far: u64,
+    pub out_of_range_depths: u64,
 }
 
 impl Writer {
@@ -81,11 +81,11 @@ impl Writer {
     /// another process writes it, or it cannot be written; the depth scale is not a number > 0.
     pub fn create(dir: &Path, options: &WriterOptions) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
-        GrowingList::rescue(dir, &[DEPTH_LIST, COLOR_LIST])?;
+        GrowingList::recover_interrupted(dir, &[DEPTH_LIST, COLOR_LIST])?;
         if options.overwrite {
-            folder::adopt(dir, listed::pictures(dir).chain(listed::lists(dir)))?;
+            folder::adopt_files(dir, listed::find_pictures(dir).chain(listed::find_lists(dir)))?;
         }
-        let folder = Folder::open(dir, options.overwrite, &SET).map_err(|error| match error {
+        let folder = Folder::open(dir, options.overwrite, &FILE_SET).map_err(|error| match error {
             FolderError::NotEmpty { path } => RecordingError::Exists { path },
             other => other.into(),
         })?;
@@ -100,7 +100,7 @@ impl Writer {
             count: 0,
             last_ns: None,
             size: None,
-            depths: (0, 0),
+            depth_counts: (0, 0),
             units: Vec::new(),
             file: Vec::new(),
         })
@@ -112,23 +112,23 @@ impl Writer {
     /// The frame does not fit the recording: its time is not after the last one, the size of the colour picture differs
     /// from the first, or the depth map does not cover it. Or a file cannot be written. The recording is unchanged.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
-        self.check(time_ns, color, depth)
+        self.check_frame(time_ns, color, depth)
             .map_err(|reason| RecordingError::Unrecordable { index: self.count, reason })?;
 
         let file_name = format!("{:06}.png", self.count);
-        let mut depths = self.depths;
+        let mut depth_counts = self.depth_counts;
         if let Some(depth) = depth {
             self.file.clear();
-            encode::depth_png(depth, self.depth_scale, None, &mut self.units, &mut self.file)
-                .map_err(|e| self.encoding(e))?;
+            encode::encode_depth_png(depth, self.depth_scale, None, &mut self.units, &mut self.file)
+                .map_err(|e| self.encoding_error(e))?;
             self.write_picture(DEPTH_FOLDER, &file_name)?;
             let known = || depth.metres.iter().filter(|&&metres| DepthMap::is_known(metres));
             let max_depth_m = self.max_depth_m();
-            depths.0 += known().count() as u64;
-            depths.1 += known().filter(|&&metres| metres > max_depth_m).count() as u64;
+            depth_counts.0 += known().count() as u64;
+            depth_counts.1 += known().filter(|&&metres| metres > max_depth_m).count() as u64;
         }
         self.file.clear();
-        encode::color_png(color, &mut self.file).map_err(|e| self.encoding(e))?;
+        encode::encode_color_png(color, &mut self.file).map_err(|e| self.encoding_error(e))?;
         self.write_picture(COLOR_FOLDER, &file_name)?;
 
         // Lists after pictures, so that listed files exist; a frame that fails is in neither list.
@@ -136,7 +136,9 @@ impl Writer {
         if depth.is_some() {
             let list = match &mut self.depth {
                 Some(list) => list,
-                none => none.insert(GrowingList::create(&self.folder, DEPTH_LIST, &depth_head(self.depth_scale))?),
+                none => {
+                    none.insert(GrowingList::create(&self.folder, DEPTH_LIST, &format_depth_header(self.depth_scale))?)
+                }
             };
             list.add_line(format_args!("{time} {DEPTH_FOLDER}/{file_name}"))?;
         }
@@ -146,8 +148,8 @@ impl Writer {
             }
             return Err(error);
         }
-        (self.count, self.last_ns, self.size, self.depths) =
-            (self.count + 1, Some(time_ns), Some(color.size()), depths);
+        (self.count, self.last_ns, self.size, self.depth_counts) =
+            (self.count + 1, Some(time_ns), Some(color.size()), depth_counts);
         Ok(())
     }
 
@@ -158,16 +160,16 @@ impl Writer {
 
     /// Returns the largest depth that can be written, in metres.
     pub fn max_depth_m(&self) -> f32 {
-        encode::largest(self.depth_scale)
+        encode::max_value(self.depth_scale)
     }
 
     /// Completes the recording: its lists get their names, and a replaced recording is removed.
     ///
     /// # Errors
     /// No frame was added (an empty recording cannot be read), or a list cannot be written.
-    pub fn finish(self) -> Result<Written, RecordingError> {
-        let mut written = self.written();
-        let folder = self.with_lists()?;
+    pub fn finish(self) -> Result<RecordingSummary, RecordingError> {
+        let mut written = self.summary();
+        let folder = self.finish_lists()?;
         written.replaced = folder.finish()?;
         Ok(written)
     }
@@ -177,34 +179,34 @@ impl Writer {
     ///
     /// # Errors
     /// Same as for [`Writer::finish`].
-    pub fn cut(self) -> Result<Written, RecordingError> {
-        let mut written = self.written();
-        let folder = self.with_lists()?;
-        written.dir = folder.cut()?.unwrap_or(written.dir);
+    pub fn finish_incomplete(self) -> Result<RecordingSummary, RecordingError> {
+        let mut written = self.summary();
+        let folder = self.finish_lists()?;
+        written.dir = folder.finish_incomplete()?.unwrap_or(written.dir);
         Ok(written)
     }
 
-    fn written(&self) -> Written {
-        let (depths, too_far) = self.depths;
-        Written { dir: self.dir.clone(), frames: self.count, replaced: 0, depths, too_far }
+    fn summary(&self) -> RecordingSummary {
+        let (known_depths, out_of_range_depths) = self.depth_counts;
+        RecordingSummary { dir: self.dir.clone(), frames: self.count, replaced: 0, known_depths, out_of_range_depths }
     }
 
     /// Finishes the lists and returns the folder.
-    fn with_lists(self) -> Result<Folder, RecordingError> {
+    fn finish_lists(self) -> Result<Folder, RecordingError> {
         let mut folder = self.folder;
         if self.count == 0 {
             return Err(RecordingError::NothingRecorded { dir: self.dir });
         }
         // The colour list comes last, because it makes the folder a recording.
         if let Some(depth) = self.depth {
-            depth.put(&mut folder)?;
+            depth.commit(&mut folder)?;
         }
-        self.color.put(&mut folder)?;
+        self.color.commit(&mut folder)?;
         Ok(folder)
     }
 
     /// Checks that the frame can be the next one of the recording; returns the reason if not.
-    fn check(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
+    fn check_frame(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
         let (width, height) = color.size();
         if let Some(last_ns) = self.last_ns.filter(|&last_ns| time_ns <= last_ns) {
             return Err(format!("its time {} s is not after the last one, {} s", Seconds(time_ns), Seconds(last_ns)));
@@ -235,23 +237,23 @@ impl Writer {
         Ok(())
     }
 
-    fn encoding(&self, error: impl std::fmt::Display) -> RecordingError {
+    fn encoding_error(&self, error: impl std::fmt::Display) -> RecordingError {
         RecordingError::Unrecordable { index: self.count, reason: error.to_string() }
     }
 
     fn write_picture(&mut self, folder: &str, file_name: &str) -> Result<(), RecordingError> {
-        let part = self.folder.begin(&format!("{folder}/{file_name}"))?;
+        let part = self.folder.create_file(&format!("{folder}/{file_name}"))?;
         part.file().write_all(&self.file).map_err(RecordingError::io("write", part.path()))?;
-        Ok(self.folder.put(part)?)
+        Ok(self.folder.commit_file(part)?)
     }
 }
 
-fn depth_head(depth_scale: f32) -> String {
+fn format_depth_header(depth_scale: f32) -> String {
     format!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown\n# timestamp filename\n")
 }
 
 /// Returns whether a recording uses this name for a list or picture, such as `rgb/000000.png`.
-fn is_ours(name: &str) -> bool {
+fn is_recording_file(name: &str) -> bool {
     let folders = [COLOR_FOLDER, DEPTH_FOLDER];
     let number = folders.iter().find_map(|folder| name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".png"));
     let is_number = |number: &str| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit());

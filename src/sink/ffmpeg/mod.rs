@@ -21,7 +21,7 @@ use self::raw::RawVideo;
 use super::output::OutputFile;
 use super::pipe::Pipe;
 use super::{Ending, Options, Sink, SinkError, check_size};
-use crate::files::whole::Part;
+use crate::files::atomic_file::PartFile;
 use crate::frame::ColorImage;
 
 /// Longest wait for an encoder to start reading; frames are sent to it in any case.
@@ -76,10 +76,11 @@ impl Ffmpeg {
         if self.format.container != Container::Mp4 {
             return;
         }
-        let indexed = Part::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
-            let command = command::faststart_command(self.output.part_path(), part.part());
-            run_ffmpeg(command, &self.stop, self.output.path(), part.part()).map(|()| part)
-        });
+        let indexed =
+            PartFile::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
+                let command = command::faststart_command(self.output.part_path(), part.part_path());
+                run_ffmpeg(command, &self.stop, self.output.path(), part.part_path()).map(|()| part)
+            });
         match indexed {
             Ok(part) => self.output.replace_part(part),
             Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),

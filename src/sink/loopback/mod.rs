@@ -15,7 +15,7 @@ use self::encode::Encoder;
 use self::watch::ReaderWatcher;
 use super::rate::frame_rate;
 use super::{Ending, Options, Sink, SinkError, card, check_size};
-use crate::frame::fit::Fit;
+use crate::frame::fit::Letterbox;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::v4l2::loopback::{Layout, LoopbackError, Output};
@@ -32,7 +32,7 @@ pub struct Loopback {
     /// Whether YUYV frames of the run can be written unchanged.
     wants_yuyv: bool,
     encoder: Encoder,
-    fit: Fit,
+    fit: Letterbox,
     fitted: ColorImage,
     /// The last frame written, encoded.
     bytes: Vec<u8>,
@@ -65,7 +65,7 @@ impl Loopback {
         let mut loopback = Self {
             wants_yuyv: output.layout() == Layout::Yuyv && output.size() == options.size,
             encoder: Encoder::new(output.layout()),
-            fit: Fit::default(),
+            fit: Letterbox::default(),
             fitted: ColorImage::new(output.size().0, output.size().1),
             bytes: Vec::new(),
             shows_card: true,
@@ -113,7 +113,7 @@ fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<ReaderW
 
 impl Sink for Loopback {
     fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.encoder.encode(self.fit.fitted(frame, &mut self.fitted), &mut self.bytes);
+        self.encoder.encode(self.fit.fit_if_needed(frame, &mut self.fitted), &mut self.bytes);
         self.shows_card = false;
         self.output.write_frame(&self.bytes)?;
         Ok(ControlFlow::Continue(()))

@@ -4,7 +4,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::frame::ColorImage;
-use crate::frame::fit::Fit;
+use crate::frame::fit::Letterbox;
 use crate::layout::{Family, FourCc, Layout};
 use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
 use crate::pipewire::node::PictureMemory;
@@ -24,7 +24,7 @@ pub(super) struct Encoder {
     format: Format,
     layout: Layout,
     method: Method,
-    fit: Fit,
+    fit: Letterbox,
     fitted: ColorImage,
 }
 
@@ -88,7 +88,7 @@ impl Encoder {
             _ => Method::Raw(Box::new(raw::Encoder::new(&layout)?)),
         };
         let fitted = ColorImage::new(format.size.0, format.size.1);
-        Some(Self { format, layout, method, fit: Fit::default(), fitted })
+        Some(Self { format, layout, method, fit: Letterbox::default(), fitted })
     }
 
     pub fn format(&self) -> Format {
@@ -113,7 +113,7 @@ impl Encoder {
     /// Encodes a picture, scaled into the format's size, into `bytes`, whose content is replaced.
     pub fn encode(&mut self, picture: &ColorImage, bytes: &mut Vec<u8>) {
         let needed = self.picture_memory().bytes;
-        let picture = self.fit.fitted(picture, &mut self.fitted);
+        let picture = self.fit.fit_if_needed(picture, &mut self.fitted);
         match &mut self.method {
             Method::Yuyv(encoder) => {
                 bytes.resize(needed, 0);

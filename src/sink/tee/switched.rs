@@ -75,7 +75,7 @@ fn switch() -> (Box<Tee>, TeeControl, Receiver<MemberEvent>) {
 
 /// Sends frames, each after the members have processed the previous one.
 fn write_frames(switch: &mut Tee, numbers: std::ops::Range<u8>) {
-    let frames = |count: &Counter<OutputUse>| count().frames + count().lost;
+    let frames = |count: &Counter<OutputCounts>| count().frames + count().lost;
     for number in numbers {
         switch.handle_requests();
         let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.create_counter()).collect();

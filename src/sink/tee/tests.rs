@@ -119,7 +119,7 @@ fn next(told: &Receiver<String>) -> String {
 }
 
 /// Returns the counts of an output, by its name.
-fn used(frames: &[Counter<OutputUse>], name: &str) -> OutputUse {
+fn used(frames: &[Counter<OutputCounts>], name: &str) -> OutputCounts {
     frames.iter().map(|count| count()).find(|output| output.output == name).unwrap()
 }
 
@@ -146,7 +146,7 @@ fn in_real_time_none_waits_for_another_and_each_counts_what_it_lost() {
     drop(may);
     tee.finish(Ending::Complete).unwrap();
     assert_eq!((next(&taken), next(&taken), next(&taken)), ("0".into(), "49".into(), "Complete".into()));
-    let expected = |output: &str, frames, lost| OutputUse { output: output.into(), frames, repeats: 0, lost };
+    let expected = |output: &str, frames, lost| OutputCounts { output: output.into(), frames, repeats: 0, lost };
     assert_eq!(used(&frames, "stalled"), expected("stalled", 2, 48));
     assert_eq!(used(&frames, "camera"), expected("camera", 50, 0));
 }

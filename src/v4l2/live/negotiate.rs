@@ -75,7 +75,7 @@ const SAME_RATE: f64 = 0.1;
 pub fn rank_modes(modes: &[FormatModes], request: &ModeRequest, link_speed: LinkSpeed) -> Result<Vec<Choice>, NoMode> {
     let readable = |fourcc: FourCc| fourcc.content() == Some(request.content);
     let suits = |format: &&FormatModes| readable(format.fourcc) && request.fourcc.is_none_or(|f| f == format.fourcc);
-    let mut best: Vec<(Rank, Choice)> =
+    let mut best: Vec<(ModePenalties, Choice)> =
         modes.iter().filter(suits).filter_map(|format| find_best_mode(format, request, link_speed)).collect();
     if best.is_empty() {
         let offered = join_names(modes.iter().map(|format| format.fourcc));
@@ -90,19 +90,23 @@ pub fn rank_modes(modes: &[FormatModes], request: &ModeRequest, link_speed: Link
             },
         });
     }
-    best.sort_by(|(a, _), (b, _)| compare_ranks(a, b));
+    best.sort_by(|(a, _), (b, _)| compare_penalties(a, b));
     Ok(best.into_iter().map(|(_, choice)| choice).collect())
 }
 
 /// Penalties of a mode, the most important first; compared lexicographically, the smallest wins.
-type Rank = [f64; 6];
+type ModePenalties = [f64; 6];
 
-fn compare_ranks(a: &Rank, b: &Rank) -> Ordering {
+fn compare_penalties(a: &ModePenalties, b: &ModePenalties) -> Ordering {
     a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
 /// Finds the mode of a format that is nearest to the request.
-fn find_best_mode(format: &FormatModes, request: &ModeRequest, link_speed: LinkSpeed) -> Option<(Rank, Choice)> {
+fn find_best_mode(
+    format: &FormatModes,
+    request: &ModeRequest,
+    link_speed: LinkSpeed,
+) -> Option<(ModePenalties, Choice)> {
     let wanted_px = request.size_px.unwrap_or(DEFAULT_SIZE_PX);
     let modes: Vec<((u32, u32), &Rates)> = match &format.sizes {
         Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
@@ -120,7 +124,7 @@ fn find_best_mode(format: &FormatModes, request: &ModeRequest, link_speed: LinkS
     };
     let ranked =
         modes.into_iter().map(|(size_px, rates)| rank_mode(format, size_px, rates, wanted_px, request, link_speed));
-    ranked.min_by(|(a, _), (b, _)| compare_ranks(a, b))
+    ranked.min_by(|(a, _), (b, _)| compare_penalties(a, b))
 }
 
 /// Returns the penalties of a format at one of its sizes, and the mode to request there: the rate nearest to the
@@ -132,7 +136,7 @@ fn rank_mode(
     wanted_px: (u32, u32),
     request: &ModeRequest,
     link_speed: LinkSpeed,
-) -> (Rank, Choice) {
+) -> (ModePenalties, Choice) {
     let wanted = Interval::from_fps(request.fps.unwrap_or(DEFAULT_FPS));
     // Where the driver lists no rates, the requested one is as good as any.
     let interval = rates.nearest_interval(wanted).unwrap_or(wanted);

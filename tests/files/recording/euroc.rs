@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use bokehcam::recording::{Options, Pair, Recording, Unpaired};
+use bokehcam::recording::{Options, Recording, StereoGeometry, Unpaired};
 
 use super::{SIZE, Scene, assert_says, color_of, right_of, save_grey, times_ns};
 
@@ -33,7 +33,7 @@ fn with_cameras(count: u64) -> Scene {
 fn assert_is_whole(recording: &Recording) {
     assert_eq!((recording.layout(), recording.len(), recording.size()), ("EuRoC/ASL", 3, SIZE));
     assert_eq!(times_ns(recording), [0, PERIOD_NS, 2 * PERIOD_NS]);
-    assert_eq!((recording.pair(), recording.has_depth()), (Some(&Pair::Unstated), false));
+    assert_eq!((recording.stereo_geometry(), recording.has_depth()), (Some(&StereoGeometry::Uncalibrated), false));
     for index in 0..3 {
         assert_eq!(color_of(recording, index).unwrap().rgb[0], 10 + index as u8);
         assert_eq!(right_of(recording, index).unwrap().luma[0], 100 + index as u8);
@@ -95,7 +95,7 @@ fn one_camera_is_a_recording_without_a_right_eye() {
     let scene = with_cameras(2);
     fs::remove_dir_all(scene.path("mav0/cam1")).unwrap();
     let recording = scene.open().unwrap();
-    assert_eq!((recording.len(), recording.pair()), (2, None));
+    assert_eq!((recording.len(), recording.stereo_geometry()), (2, None));
     assert_says(right_of(&recording, 0), &["one camera"]);
 }
 

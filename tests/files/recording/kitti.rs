@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use bokehcam::recording::{Options, Pair, RecordingError, Unpaired};
+use bokehcam::recording::{Options, RecordingError, StereoGeometry, Unpaired};
 
 use super::{SIZE, Scene, assert_says, color_of, right_of, save_grey, times_ns};
 
@@ -41,9 +41,11 @@ fn a_sequence_has_two_rectified_eyes_and_its_times() {
     let recording = scene.open().unwrap();
     assert_eq!((recording.layout(), recording.len(), recording.has_depth()), ("KITTI", 3, false));
     assert_eq!(times_ns(&recording), [0, 103_735_900, 207_434_200]);
-    let Some(Pair::Rectified(rig)) = recording.pair() else { panic!("{:?}", recording.pair()) };
+    let Some(StereoGeometry::Rectified(rig)) = recording.stereo_geometry() else {
+        panic!("{:?}", recording.stereo_geometry())
+    };
     assert_eq!((rig.focal_px, rig.baseline_m, rig.doffs_px, rig.metric), (700.0, 0.55, 2.0, true));
-    assert_eq!((recording.disparities(), recording.unpaired()), (None, Unpaired::default()));
+    assert_eq!((recording.disparity_count(), recording.unpaired()), (None, Unpaired::default()));
     for index in 0..3 {
         assert_eq!(color_of(&recording, index).unwrap().rgb[..3], [index as u8, 100, 200]);
         let right = right_of(&recording, index).unwrap();
@@ -64,16 +66,20 @@ fn the_folders_that_people_have_are_known() {
         let recording = scene.open().unwrap();
         // Without a calibration: ten frames a second, of cameras in unknown positions.
         assert_eq!(times_ns(&recording), [0, 100_000_000]);
-        assert_eq!(recording.pair(), Some(&Pair::Unstated));
+        assert_eq!(recording.stereo_geometry(), Some(&StereoGeometry::Uncalibrated));
         scene.write("calib_cam_to_cam.txt", CALIBRATION.replace('P', "P_rect_0"));
         let recording = scene.open().unwrap();
-        let Some(Pair::Rectified(rig)) = recording.pair() else { panic!("{:?}", recording.pair()) };
+        let Some(StereoGeometry::Rectified(rig)) = recording.stereo_geometry() else {
+            panic!("{:?}", recording.stereo_geometry())
+        };
         assert_eq!(rig.baseline_m, baseline_m, "{left}");
     }
     let scene = with_eyes("image_l", "image_r", 2);
     let rows: String = CALIBRATION.lines().take(2).map(|line| format!("{}\n", &line[4..])).collect();
     scene.write("calib.txt", rows);
-    assert!(matches!(scene.open().unwrap().pair(), Some(Pair::Rectified(rig)) if rig.baseline_m == 0.5));
+    assert!(
+        matches!(scene.open().unwrap().stereo_geometry(), Some(StereoGeometry::Rectified(rig)) if rig.baseline_m == 0.5)
+    );
 }
 
 #[test]
@@ -191,6 +197,6 @@ fn a_wrong_calibration_fails_the_opening() {
 fn a_recording_with_one_eye_has_no_right_one() {
     let recording = Scene::with_pairs(1);
     let recording = recording.open().unwrap();
-    assert_eq!((recording.pair(), recording.disparities()), (None, None));
+    assert_eq!((recording.stereo_geometry(), recording.disparity_count()), (None, None));
     assert_says(right_of(&recording, 0), &["the recording has one camera"]);
 }

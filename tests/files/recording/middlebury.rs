@@ -4,7 +4,7 @@ use std::fs;
 
 use bokehcam::frame::DisparityMap;
 use bokehcam::recording::still::write_disparity;
-use bokehcam::recording::{Options, Pair, Recording};
+use bokehcam::recording::{Options, Recording, StereoGeometry};
 
 use super::{SIZE, Scene, assert_says, color_of, depth_of, right_of, save_grey, times_ns};
 
@@ -28,9 +28,11 @@ fn a_pair_is_a_recording_of_one_frame_with_depth() {
     let scene = with_pair();
     let recording = scene.open().unwrap();
     assert_eq!((recording.layout(), times_ns(&recording)), ("Middlebury stereo", vec![0]));
-    let Some(Pair::Rectified(rig)) = recording.pair() else { panic!("{:?}", recording.pair()) };
+    let Some(StereoGeometry::Rectified(rig)) = recording.stereo_geometry() else {
+        panic!("{:?}", recording.stereo_geometry())
+    };
     assert_eq!((rig.focal_px, rig.baseline_m, rig.doffs_px), (100.0, 0.12, 2.0));
-    assert_eq!((recording.disparities(), recording.has_depth()), (Some(32), true));
+    assert_eq!((recording.disparity_count(), recording.has_depth()), (Some(32), true));
     assert_eq!(color_of(&recording, 0).unwrap().rgb[..3], [7, 100, 200]);
     assert_eq!(right_of(&recording, 0).unwrap().luma, [9; 24 * 16]);
     // Z = baseline f / (d + doffs); infinity is unknown.
@@ -46,8 +48,8 @@ fn nothing_but_the_pictures_is_needed() {
             save_grey(&scene.path(name), SIZE, 3);
         }
         let recording = scene.open().unwrap();
-        assert_eq!((recording.pair(), recording.has_depth()), (Some(&Pair::Unstated), false));
-        assert_eq!(recording.disparities(), None);
+        assert_eq!((recording.stereo_geometry(), recording.has_depth()), (Some(&StereoGeometry::Uncalibrated), false));
+        assert_eq!(recording.disparity_count(), None);
     }
     // Disparity without a calibration gives no depth.
     let scene = with_pair();
@@ -63,8 +65,10 @@ fn a_calibration_of_another_size_is_scaled_or_refused() {
     let half = DisparityMap { width: 6, height: 4, px: vec![1.0; 24] };
     write_disparity(&scene.path("disp0.pfm"), &half, None, true).unwrap();
     let recording = scene.open().unwrap();
-    let Some(Pair::Rectified(rig)) = recording.pair() else { panic!("{:?}", recording.pair()) };
-    assert_eq!((rig.focal_px, rig.doffs_px, recording.disparities()), (50.0, 1.0, Some(16)));
+    let Some(StereoGeometry::Rectified(rig)) = recording.stereo_geometry() else {
+        panic!("{:?}", recording.stereo_geometry())
+    };
+    assert_eq!((rig.focal_px, rig.doffs_px, recording.disparity_count()), (50.0, 1.0, Some(16)));
     // One pixel of six columns is two of twelve, and four of the calibration's 24.
     assert_eq!(depth_of(&recording, 0).unwrap().metres, [2.0; 24]);
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::recording::{Options, Pair, Recording, Scratch};
+use bokehcam::recording::{Options, Recording, Scratch, StereoGeometry};
 
 use super::{color_of, depth_of, right_of};
 
@@ -46,19 +46,21 @@ fn open(folder: &str) -> Recording {
 fn sequences_of_two_eyes() {
     let kitti = open("stereo_seq/KITTI_sequence_1");
     assert_eq!((kitti.layout(), kitti.len(), kitti.size(), kitti.period_ns()), ("KITTI", 20, (1226, 370), 100_000_000));
-    let Some(Pair::Rectified(rig)) = kitti.pair() else { panic!("{:?}", kitti.pair()) };
+    let Some(StereoGeometry::Rectified(rig)) = kitti.stereo_geometry() else { panic!("{:?}", kitti.stereo_geometry()) };
     assert!((rig.focal_px - 707.091).abs() < 1e-3 && (rig.baseline_m - 0.537).abs() < 1e-3, "{rig:?}");
 
     let euroc = open("stereo_seq/MicroEurocDataset");
     assert_eq!((euroc.layout(), euroc.len(), euroc.size()), ("EuRoC/ASL", 6, (752, 480)));
     // Times come from the names of the pictures: there is no list.
     assert_eq!((euroc.time_ns(1), euroc.time_ns(5)), (50_000_128, 250_000_128));
-    let Some(Pair::Raw(calibration)) = euroc.pair() else { panic!("{:?}", euroc.pair()) };
+    let Some(StereoGeometry::Raw(calibration)) = euroc.stereo_geometry() else {
+        panic!("{:?}", euroc.stereo_geometry())
+    };
     assert!((calibration.translation_m.length() - 0.110).abs() < 1e-3, "{calibration:?}");
     assert_eq!(right_of(&euroc, 5).unwrap().size(), (752, 480));
 
     let scenes = open("stereo/kitti2012");
-    assert_eq!((scenes.len(), scenes.pair()), (8, Some(&Pair::Unstated)));
+    assert_eq!((scenes.len(), scenes.stereo_geometry()), (8, Some(&StereoGeometry::Uncalibrated)));
 
     for index in 0..kitti.len() {
         color_of(&kitti, index).unwrap();
@@ -70,12 +72,12 @@ fn sequences_of_two_eyes() {
 #[ignore = "needs BOKEHCAM_DATA, a folder with stereo"]
 fn pairs_with_and_without_a_calibration() {
     let terrace = open("stereo/terrace");
-    assert_eq!((terrace.layout(), terrace.disparities()), ("Middlebury stereo", None));
+    assert_eq!((terrace.layout(), terrace.disparity_count()), ("Middlebury stereo", None));
     assert_eq!(right_of(&terrace, 0).unwrap().size(), (713, 434));
     let mut known: Vec<f32> = depth_of(&terrace, 0).unwrap().metres;
     known.retain(|metres| *metres > 0.0);
     // A terrace, measured by a laser: half of the pixels, from 1.5 to 30 m.
     assert!((0.5..0.56).contains(&(known.len() as f32 / (713.0 * 434.0))), "{}", known.len());
     assert!(known.iter().all(|metres| (1.0..100.0).contains(metres)));
-    assert_eq!(open("stereo/cones").pair(), Some(&Pair::Unstated));
+    assert_eq!(open("stereo/cones").stereo_geometry(), Some(&StereoGeometry::Uncalibrated));
 }

@@ -225,38 +225,41 @@ fn profile_and_exif_go_with_the_picture() {
     let exif = exif();
     let mut image = ColorImage::new(32, 16);
     image.rgb[..48].fill(255);
-    let extras = bokehcam::recording::Extras {
+    let metadata = bokehcam::recording::PhotoMetadata {
         icc_profile: Some(profile.clone()),
         exif: Some(exif.clone()),
         ..Default::default()
     };
-    write_photo(&path("in.png"), &image, &extras, false).unwrap();
-    write_photo(&path("in.jpg"), &image, &extras, false).unwrap();
+    write_photo(&path("in.png"), &image, &metadata, false).unwrap();
+    write_photo(&path("in.jpg"), &image, &metadata, false).unwrap();
     for (from, to) in [("in.png", "a.png"), ("in.png", "a.jpg"), ("in.jpg", "b.png"), ("in.jpg", "b.jpg")] {
-        let (upright, extras) = read_photo(&path(from)).unwrap();
-        assert_eq!((upright.size(), extras.icc_profile.as_ref()), ((16, 32), Some(&profile)), "{from}");
-        write_photo(&path(to), &upright, &extras.without_thumbnail().for_jpeg(), false).unwrap();
+        let (upright, metadata) = read_photo(&path(from)).unwrap();
+        assert_eq!((upright.size(), metadata.icc_profile.as_ref()), ((16, 32), Some(&profile)), "{from}");
+        write_photo(&path(to), &upright, &metadata.without_thumbnail().for_jpeg(), false).unwrap();
         // Rotated once, not twice.
-        let (again, extras) = read_photo(&path(to)).unwrap();
-        assert_eq!((again.size(), extras.icc_profile, extras.left_behind.len()), ((16, 32), Some(profile.clone()), 0));
-        let kept = extras.exif.unwrap();
+        let (again, metadata) = read_photo(&path(to)).unwrap();
+        assert_eq!(
+            (again.size(), metadata.icc_profile, metadata.lost_properties.len()),
+            ((16, 32), Some(profile.clone()), 0)
+        );
+        let kept = metadata.exif.unwrap();
         let camera = |exif: &[u8]| exif.windows(3).any(|part| part == b"CAM");
         assert!(camera(&kept) && !kept.windows(5).any(|part| part == b"THUMB"), "{to}");
         assert_eq!(kept[30..32], [0, 1], "it says that it is upright");
     }
 
-    // `left_behind` names the properties that 8-bit RGB cannot hold.
+    // `lost_properties` names the properties that 8-bit RGB cannot hold.
     let wide = ImageBuffer::<image::Rgba<u16>, _>::from_pixel(2, 2, [1, 2, 3, 4].into());
     DynamicImage::from(wide).save(path("wide.png")).unwrap();
-    assert_eq!(read_photo(&path("wide.png")).unwrap().1.left_behind, ["transparency", "16 bits a channel"]);
-    assert!(read_photo(&path("in.png")).unwrap().1.left_behind.is_empty());
+    assert_eq!(read_photo(&path("wide.png")).unwrap().1.lost_properties, ["transparency", "16 bits a channel"]);
+    assert!(read_photo(&path("in.png")).unwrap().1.lost_properties.is_empty());
 }
 
 #[test]
 fn exif_that_leads_nowhere_is_left_behind() {
     let whole = exif();
     for length in 0..whole.len() {
-        let cut = bokehcam::recording::Extras { exif: Some(whole[..length].to_vec()), ..Default::default() };
+        let cut = bokehcam::recording::PhotoMetadata { exif: Some(whole[..length].to_vec()), ..Default::default() };
         let kept = cut.without_thumbnail();
         assert!(kept.exif.is_none_or(|exif| !exif.windows(5).any(|part| part == b"THUMB")));
     }

@@ -87,7 +87,7 @@ fn the_lists_appear_only_when_whole() {
     let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
     writer.add(5, &color, Some(&depth)).unwrap();
     assert_says(Recording::open(dir.path(), &Options::default()), &["not a recording"]);
-    let written = writer.cut().unwrap();
+    let written = writer.finish_incomplete().unwrap();
     assert_eq!((written.dir.as_path(), written.frames, written.replaced), (dir.path(), 1, 0));
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
     assert_eq!(color_of(&recording, 0).unwrap(), color);

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use crate::error::CliError;
 use crate::terminal::{print_to_stderr, print_to_stdout};
-use bokehcam::files::{input, whole};
+use bokehcam::files::{atomic_file, input};
 use bokehcam::network::{self, KNOWN_NETWORKS, KnownNetwork};
 
 /// List the networks that find depth in pictures of a single camera, and install them
@@ -116,7 +116,7 @@ fn install(known: &KnownNetwork, bytes: &[u8]) -> Result<(), CliError> {
             return Err(io_error(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            whole::write(&target, bytes, false).map_err(io_error(&target))?;
+            atomic_file::write(&target, bytes, false).map_err(io_error(&target))?;
         }
         Err(error) => return Err(io_error(&target)(error)),
     }

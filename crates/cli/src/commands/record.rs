@@ -14,7 +14,7 @@ use crate::terminal;
 use bokehcam::capture::{Captured, FrameBuffers, FrameData};
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::tum::{Writer, WriterOptions, Written};
+use bokehcam::recording::tum::{RecordingSummary, Writer, WriterOptions};
 use bokehcam::source::{Options, Source, SourceName};
 
 /// Record a source in the TUM RGB-D layout
@@ -160,7 +160,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
 
 /// Keeps the frames of an interrupted recording, and reports where.
 fn keep_partial(writer: Writer, to: &Path) -> Result<(), CliError> {
-    let written = writer.cut()?;
+    let written = writer.finish_incomplete()?;
     let frames = written.frames;
     if written.dir == to {
         tracing::warn!("{}: incomplete; the {frames} frames until then can be read", to.display());
@@ -190,9 +190,9 @@ fn describe_implausible(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
 }
 
 /// Warns about depth beyond the recording's range.
-fn warn_out_of_range_depth(written: &Written, max_depth_m: f32) {
-    if written.too_far > 0 {
-        let percent = 100.0 * written.too_far as f64 / written.depths as f64;
+fn warn_out_of_range_depth(written: &RecordingSummary, max_depth_m: f32) {
+    if written.out_of_range_depths > 0 {
+        let percent = 100.0 * written.out_of_range_depths as f64 / written.known_depths as f64;
         tracing::warn!(
             "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is stored as \
              unknown"

@@ -10,7 +10,7 @@ use super::table::{Values, is_setting, parse_flags, suggest_setting};
 use crate::error::CliError;
 use crate::log::{escape_controls, one_line};
 use bokehcam::files::input;
-use bokehcam::files::trusted::absolute;
+use bokehcam::files::trusted::absolute_env_path;
 use bokehcam::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use bokehcam::look::{Patch, presets::Preset};
@@ -209,7 +209,7 @@ pub fn state_folder() -> Option<PathBuf> {
 
 /// Returns this program's folder below that of the environment variable, else below `default` in the user's home.
 fn app_folder(variable: &str, default: &str) -> Option<PathBuf> {
-    let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(default)))?;
+    let folder = absolute_env_path(variable).or_else(|| Some(absolute_env_path("HOME")?.join(default)))?;
     Some(folder.join("bokehcam"))
 }
 

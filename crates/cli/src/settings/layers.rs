@@ -230,7 +230,7 @@ fn value_source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
 /// Reads the settings of a snapshot, and validates them like flags.
 fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
-    let written = snapshot::settings(path)?.into_iter();
+    let written = snapshot::read_settings(path)?.into_iter();
     let values: Values = written.map(|(name, value)| (settings::resolve_alias(&name).to_owned(), value)).collect();
     if let Some(unknown) = values.keys().find(|name| settings::find_setting(name).is_none()) {
         return Err(refuse(format!(

@@ -265,5 +265,5 @@ fn a_snapshot_is_whole_or_not_there() {
     assert_eq!(snapshot::save(&dir, "x", &shot).unwrap(), dir.join("x-3.png"));
     assert_eq!(fs::read(dir.join("x-depth.pfm")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(&dir).unwrap().count(), 5, "no leftovers");
-    assert_eq!(snapshot::settings(&dir.join("x-2.png")).unwrap(), []);
+    assert_eq!(snapshot::read_settings(&dir.join("x-2.png")).unwrap(), []);
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::Extras;
+use bokehcam::recording::PhotoMetadata;
 use bokehcam::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
 
@@ -32,7 +32,7 @@ fn halves(home: &Home) -> ColorImage {
         let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
         [if x < 80 { 180 + check } else { 20 + check }; 3]
     });
-    write_photo(&home.path("in.png"), &picture, &Extras::default(), false).unwrap();
+    write_photo(&home.path("in.png"), &picture, &PhotoMetadata::default(), false).unwrap();
     picture
 }
 
@@ -54,12 +54,13 @@ fn what_goes_with_a_picture_stays_with_it() {
     let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x10\0\x02\0\0\0\x04CAM\0\0\0\0\0".to_vec();
     let xmp =
         "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:Description dc:rights=\"Mine, \u{e4}\"/></x:xmpmeta>".to_owned();
-    let extras = Extras { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..Extras::default() };
-    write_photo(&home.path("in.jpg"), &ColorImage::new(40, 30), &extras, false).unwrap();
+    let metadata =
+        PhotoMetadata { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..PhotoMetadata::default() };
+    write_photo(&home.path("in.jpg"), &ColorImage::new(40, 30), &metadata, false).unwrap();
     for out in ["out.png", "out.jpg"] {
         let said = render(&home, "in.jpg", out);
         assert_eq!(said.lines().count(), 1, "{said}");
-        assert_eq!(read_photo(&home.path(out)).unwrap().1, extras, "{out}");
+        assert_eq!(read_photo(&home.path(out)).unwrap().1, metadata, "{out}");
     }
 }
 

@@ -12,7 +12,7 @@ use bokehcam::compute::Backend;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::recording::{Recording, Scratch};
 use bokehcam::sink::{Ending, Sink, SinkError};
-use bokehcam::stats::Cause;
+use bokehcam::stats::DropCause;
 
 /// Frame period.
 pub const PERIOD_NS: u64 = 33_333_333;
@@ -81,7 +81,7 @@ impl Camera for LoopedCamera {
         let overwritten = (now_ns.saturating_sub(due_ns) / PERIOD_NS).min(self.frames - self.position);
         if overwritten > 0 {
             self.position += overwritten;
-            return Ok(Captured::Lost(overwritten, Cause::Driver));
+            return Ok(Captured::Lost(overwritten, DropCause::Driver));
         }
         self.clock.sleep_until_ns(due_ns);
         let index = (self.position % self.recording.len() as u64) as usize;

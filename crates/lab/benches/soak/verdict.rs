@@ -48,7 +48,8 @@ pub fn print_verdict(shown: &[(u64, u64)], report: &Report) -> bool {
     let dropped = report.frames.dropped.by_cause();
     let dropped = dropped.map(|(cause, count)| format!("{cause} {count} ({:.2} %)", 100.0 * count as f64 / frames));
     println!("dropped: {}", dropped.join(", "));
-    let fractions = report.quality.share.iter().map(|(rung, share)| format!("{rung} {:.1} %", 100.0 * share));
+    let fractions =
+        report.quality.fractions.iter().map(|(level, fraction)| format!("{level} {:.1} %", 100.0 * fraction));
     let minutes = report.elapsed_s / 60.0;
     println!(
         "quality: {}; {:.1} switches a minute; {} misses ({:.2} %); depth held for {:.1} %",

@@ -5,7 +5,7 @@ use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, Vec2, vec2};
 use super::cards;
 use super::dock::{Dock, LINE};
 use super::icons::{self, Icon};
-use super::sections::{self, PresetEditor, Sheet, Thumbnails, first};
+use super::sections::{self, PanelForm, PresetEditor, Thumbnails, first};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD};
 use super::widgets::truncate_start;
@@ -65,16 +65,16 @@ impl PanelState {
                 let more = state.is_expanded();
                 let scroll = ScrollArea::vertical().max_height(inner.y.max(20.0)).auto_shrink([false, true]);
                 scroll.show(ui, |ui| {
-                    let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
-                    first::show(ui, &mut sheet, columns);
+                    let mut form = PanelForm { state, look: state.look.clone(), stroke: None, size, actions };
+                    first::show(ui, &mut form, columns);
                     if more {
-                        add_header(ui, state, sheet.actions);
+                        add_header(ui, state, form.actions);
                         add_status(ui, state);
                         ui.spacing_mut().combo_width = ui.available_width();
-                        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbnails);
+                        sections::show(ui, &mut form, &mut self.editing, &mut self.thumbnails);
                     }
                     self.scroll_to_focus(ui);
-                    let Sheet { look, stroke, .. } = sheet;
+                    let PanelForm { look, stroke, .. } = form;
                     if stroke.is_some() && look != state.look {
                         actions.push(Action::Look { look: Box::new(look), stroke });
                     }

@@ -206,13 +206,13 @@ impl EventSender {
 
     /// Reports the folder of a saved file.
     fn report_saved(&self, file: &Path) {
-        folders::folder_of(file).into_iter().for_each(|folder| self.send_update(Update::SavedIn(folder)));
+        folders::parent_folder(file).into_iter().for_each(|folder| self.send_update(Update::SavedIn(folder)));
     }
 
     /// Opens a folder in the file manager; reports failures as a note.
     fn open_folder(&self, folder: PathBuf) {
         let events = self.clone();
-        folders::open(folder, move |line| events.note(line));
+        folders::open_in_file_manager(folder, move |line| events.note(line));
     }
 
     fn send(&self, event: SessionEvent) {

@@ -111,8 +111,11 @@ impl SessionWorker {
 
     /// Recovers recordings of an earlier preview that was killed.
     fn recover_recordings(&self) {
-        for kept in self.config.folders.all().flat_map(|folder| sink::recover_videos(folder, folders::is_video)) {
-            self.events.note(format!("An earlier recording was interrupted: it is kept as {}", folders::shown(&kept)));
+        for kept in
+            self.config.folders.all().flat_map(|folder| sink::recover_videos(folder, folders::is_recording_name))
+        {
+            self.events
+                .note(format!("An earlier recording was interrupted: it is kept as {}", folders::format_path(&kept)));
         }
     }
 
@@ -262,7 +265,7 @@ impl SessionWorker {
         // A file appears under its name only when complete, so check the active outputs as well.
         self.config
             .folders
-            .free_video(|path| self.config.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
+            .unused_video_path(|path| self.config.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
     }
 
     /// Copies the equivalent command to the clipboard.
@@ -284,12 +287,12 @@ impl SessionWorker {
         match state {
             MemberState::Started => self.events.note(match virtual_camera_name(member) {
                 Some(camera) => format!("Calls have this picture now: choose the camera {camera}"),
-                None => format!("Recording to {}", folders::shown_output(member)),
+                None => format!("Recording to {}", folders::format_output(member)),
             }),
             // A virtual camera leaves no file to report.
             MemberState::Completed { .. } if virtual_camera_name(member).is_some() => {}
             MemberState::Completed { frames } => {
-                self.events.note(format!("Complete: {}, {frames} frames", folders::shown_output(member)));
+                self.events.note(format!("Complete: {}, {frames} frames", folders::format_output(member)));
                 self.events.report_saved(Path::new(member));
             }
             MemberState::Failed { why, .. } => {

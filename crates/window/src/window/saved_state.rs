@@ -8,7 +8,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::state::Preferences;
-use bokehcam::files::{input, whole};
+use bokehcam::files::{atomic_file, input};
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::RecordingError;
 use bokehcam::source::SourceName;
@@ -92,7 +92,7 @@ impl SavedState {
     pub fn write(&self, path: &Path) {
         let Ok(text) = toml::to_string(self) else { return };
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
-        let written = folder.and_then(|()| whole::write(path, text.as_bytes(), true));
+        let written = folder.and_then(|()| atomic_file::write(path, text.as_bytes(), true));
         if let Err(error) = written {
             tracing::info!("the state of the window was not saved: {}: {error}", path.display());
         }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use bokehcam::depth::plate::Step;
-use bokehcam::files::user_folders::is_video;
+use bokehcam::files::user_folders::is_recording_name;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
@@ -54,7 +54,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     watched.session.send(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
     watched.frame("no blur", |view| view.color.is_none());
     let report = watched.heard.session.close().report.unwrap();
-    assert!(report.frames.balance(), "{:?}", report.frames);
+    assert!(report.frames.is_balanced(), "{:?}", report.frames);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.until("it runs again", |told| is_running(told, 24));
     watched.until("and ends", |told| *told == Update::Source(Source::Ended));
     let report = watched.heard.session.close().report.unwrap();
-    assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
+    assert!(report.frames.is_balanced() && report.frames.captured == 2, "{:?}", report.frames);
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
         watched.until("it runs", |told| is_running(told, width));
         assert!(watched.guide.is_none());
     }
-    assert!(watched.heard.session.close().report.unwrap().frames.balance());
+    assert!(watched.heard.session.close().report.unwrap().frames.is_balanced());
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     // The film's file exists already: the command names another one.
     let (copied, end) = (watched.copied.clone().unwrap(), r#"", "camera"] [("split", "0.5")]"#);
     let film = copied.strip_prefix("show 32 [\"").and_then(|rest| rest.strip_suffix(end));
-    assert!(film.is_some_and(|film| is_video(film.rsplit('/').next().unwrap())), "{copied}");
+    assert!(film.is_some_and(|film| is_recording_name(film.rsplit('/').next().unwrap())), "{copied}");
     let has =
         |watched: &Watched, line: &str| watched.services.written.lock().unwrap().iter().any(|written| written == line);
     until("both are written", PATIENCE, || has(&watched, "film 32") && has(&watched, "camera 32"));
@@ -153,7 +153,7 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
         }
         let closed = watched.heard.session.close();
         assert!(closed.output_error.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
-        assert!(closed.report.unwrap().frames.balance());
+        assert!(closed.report.unwrap().frames.is_balanced());
     }
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));

@@ -48,7 +48,8 @@ pub struct Extent {
 
 impl Extent {
     pub fn new((width, height): (u32, u32)) -> Self {
-        let (pixels, max_entries) = (width as usize * height as usize, Matte::most(width as usize, height as usize));
+        let (pixels, max_entries) =
+            (width as usize * height as usize, Matte::max_pixels(width as usize, height as usize));
         let words = width.div_ceil(WORD) as usize * height as usize;
         Self { pixels, max_entries, words, cells: [width, height].map(|side| side.div_ceil(CELL_PX as u32)) }
     }

@@ -75,7 +75,7 @@ impl GpuMatting {
 
     /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_with_background`] does.
     /// `device_frame` has the map and the picture already; they are uploaded if it is on another device. Returns the number
-    /// of edge pixels; if that exceeds [`Matte::most`], none were evaluated.
+    /// of edge pixels; if that exceeds [`Matte::max_pixels`], none were evaluated.
     ///
     /// # Errors
     /// The device failed or has too little memory; the map then has no mixed pixels.

@@ -162,7 +162,7 @@ impl pulp::WithSimd for ComputeMatte<'_> {
                 }
             }
         }
-        if map.matte.pixels.len() > Matte::most(width, height) {
+        if map.matte.pixels.len() > Matte::max_pixels(width, height) {
             map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
     }
@@ -314,7 +314,7 @@ impl MaskView<'_> {
                 continue;
             }
             let own = self.light_at(at);
-            let (behind, difference) = match background_at.as_ref().map(|background_at| background_at(x)) {
+            let (background_alpha, difference) = match background_at.as_ref().map(|background_at| background_at(x)) {
                 Some(light) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / alpha)),
                 light => {
                     let difference = match self.interpolate_surfaces(contrasts, (x, y), light) {
@@ -325,7 +325,7 @@ impl MaskView<'_> {
                 }
             };
             let (at, near_m) = (at as u32, DepthMap::SUBJECT_M);
-            map.matte.pixels.push(MixedPixel { at, near_m, far_m, alpha, behind, difference });
+            map.matte.pixels.push(MixedPixel { at, near_m, far_m, alpha, background_alpha, difference });
         }
     }
 
@@ -338,7 +338,7 @@ impl MaskView<'_> {
             let (own, light) = (self.light_at(row + x), background_at(x));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
             let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
-            MixedPixel { at, near_m, far_m, alpha: 1.0, behind: 1.0, difference }
+            MixedPixel { at, near_m, far_m, alpha: 1.0, background_alpha: 1.0, difference }
         }));
     }
 }

@@ -122,7 +122,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
     let left = to_luma(&color);
     let disparities =
-        command.resolve_disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
+        command.resolve_disparity_range(geometry.and_then(|geometry| geometry.disparity_count), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
     let computing = ComputeOptions { backend: command.backend, adapter, threads };
     let mut matcher = computing.create_matcher(disparities, command.effort, size)?;
@@ -206,7 +206,7 @@ impl DepthCommand {
         size: (u32, u32),
         note: &dyn Fn(String),
     ) -> Result<(Option<Geometry>, Option<Rectifier>), CliError> {
-        let from_rig = |rig| Geometry { rig, size: None, disparities: None };
+        let from_rig = |rig| Geometry { rig, size: None, disparity_count: None };
         if self.calib.is_empty() {
             let doffs_px = self.doffs_px.unwrap_or(0.0);
             let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };

@@ -169,7 +169,7 @@ pub fn show_source(
             demand: Demand::default(),
             off: Arc::default(),
             shutter: Arc::default(),
-            folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
+            folders: window.save_to.clone().map_or_else(Folders::from_user_dirs, Folders::single),
         },
         theme: window.theme,
         device,

@@ -13,7 +13,7 @@ use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::Look;
 use bokehcam::optics::StereoRig;
 use bokehcam::recording::still::{self, MapFormat};
-use bokehcam::recording::{Extras, snapshot};
+use bokehcam::recording::{PhotoMetadata, snapshot};
 use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
@@ -21,7 +21,7 @@ use bokehcam::source::{self, DepthChoice, DepthOrigin};
 /// Input of the blur.
 pub(super) struct Input {
     pub color: ColorImage,
-    pub extras: Extras,
+    pub metadata: PhotoMetadata,
     pub depth: Option<Depth>,
     /// Origin of depth that was found in or beside the photo.
     pub found: Option<FoundDepth>,
@@ -37,16 +37,16 @@ pub(super) struct FoundDepth {
 /// Reads the picture, its metadata, and its depth, if any. Inputs not named in the command come from the snapshot of
 /// `--like`; its depth is already refined and is not refined again.
 pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
-    let sources = command.like.as_ref().map(|like| snapshot::sources(like));
+    let sources = command.like.as_ref().map(|like| snapshot::source_paths(like));
     let given =
         command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
     let mut found = None;
-    let (color, extras, depth) = match (&command.image, sources) {
+    let (color, metadata, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
             let is_used = given.is_none() && depth.exists();
             let kept = is_used.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
-            let (color, extras) = still::read_photo(&color)?;
-            (color, extras, given.or(kept))
+            let (color, metadata) = still::read_photo(&color)?;
+            (color, metadata, given.or(kept))
         }
         (image, _) => {
             // clap requires an image without `--like`.
@@ -56,7 +56,7 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
             let searches_depth = searches_depth && is_automatic;
             // A snapshot stands for the picture that it was made from.
             let image = if searches_depth { photo::original_path(image) } else { image.to_owned() };
-            let (color, extras) = still::read_photo(&image)?;
+            let (color, metadata) = still::read_photo(&image)?;
             let is_wanted = searches_depth && look.effect.follows_depth();
             let depth = if is_wanted {
                 photo::read_default_depth(&image, &color, &command.source_options(), look)?
@@ -70,7 +70,7 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
                 found = Some(FoundDepth { from, measured, by });
                 if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }
             });
-            (color, extras, given.or(depth))
+            (color, metadata, given.or(depth))
         }
     };
     let mut depth = depth;
@@ -79,7 +79,7 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         source::find_person(&command.source_options(), look, &color, map);
     }
     let made = compute_depth(command, look, &color)?;
-    Ok(Input { color, extras, depth: made.or(depth), found })
+    Ok(Input { color, metadata, depth: made.or(depth), found })
 }
 
 /// Computes depth from a mask or by networks; returns `None` if neither is requested.

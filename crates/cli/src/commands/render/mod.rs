@@ -94,7 +94,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         refuse_overwriting_source("--out", &command.out, source)?;
         // That folder's files have fixed names, which may match a source.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
-            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+            && source.parent().is_some_and(|folder| place::resolve_links(folder) == place::resolve_links(dir))
         {
             refuse_overwriting_source("--debug-dir", dir, source)?;
         }
@@ -113,7 +113,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         )));
     }
     let look = look::build_look(&command.blur, &command.computing.quality)?;
-    let Input { color, extras, depth, found } = read_input(command, &look)?;
+    let Input { color, metadata, depth, found } = read_input(command, &look)?;
     let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
@@ -133,14 +133,14 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         None => engine::still::blur_picture(&look, color, depth, &computing)?,
     };
     // The metadata's thumbnail would show the unblurred picture.
-    let mut extras = extras.without_thumbnail();
+    let mut metadata = metadata.without_thumbnail();
     if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
-        extras = extras.for_jpeg();
+        metadata = metadata.for_jpeg();
     }
-    still::write_photo(&command.out, &result, &extras, command.output.force)?;
+    still::write_photo(&command.out, &result, &metadata, command.output.force)?;
     if !global.quiet {
-        if !extras.left_behind.is_empty() {
-            log::note(&format!("not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
+        if !metadata.lost_properties.is_empty() {
+            log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
         }
         found.iter().for_each(|found| terminal::print_to_stderr(&format!("depth by {}", found.by)));
         terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
@@ -238,7 +238,7 @@ fn report_misalignment(file: &dyn Display, look: &Look, map: &DepthMap, color: &
 /// Lists all input files, which the outputs must not replace.
 fn input_files(command: &RenderCommand) -> Vec<PathBuf> {
     let snapshot_files = command.like.iter().flat_map(|like| {
-        let (color, depth) = snapshot::sources(like);
+        let (color, depth) = snapshot::source_paths(like);
         [like.clone(), color, depth]
     });
     let aperture = match &command.blur.look.0.aperture {

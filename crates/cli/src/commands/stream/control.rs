@@ -223,7 +223,7 @@ impl ControllableRun for Stream {
         let picture = self.run.shutter.copy_next_picture(PICTURE_TIMEOUT);
         let picture =
             picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PICTURE_TIMEOUT.as_secs())))?;
-        let path = to.map_or_else(|| Folders::of_user().free_picture(), Path::to_owned);
+        let path = to.map_or_else(|| Folders::from_user_dirs().unused_picture_path(), Path::to_owned);
         let write = || -> Result<(), CliError> {
             create_parent_folder(&path)?;
             Ok(still::write_color(&path, &picture, false)?)

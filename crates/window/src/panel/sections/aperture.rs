@@ -5,7 +5,7 @@ use egui::{
 };
 use egui::{Role, WidgetInfo, pos2};
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::theme::Colors;
 use crate::panel::widgets::{Number, RadioGroup, Tooltip, add_number};
 use crate::texts::tr;
@@ -25,9 +25,9 @@ pub struct Thumbnails {
 }
 
 /// Adds the shape, its parameters, and the highlights that reveal it.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
-    shape_row(ui, sheet, thumbnails);
-    let mut shape = sheet.look.aperture.shape.clone();
+pub fn show(ui: &mut Ui, form: &mut PanelForm, thumbnails: &mut Thumbnails) {
+    shape_row(ui, form, thumbnails);
+    let mut shape = form.look.aperture.shape.clone();
     let changed = match &mut shape {
         Shape::Disc | Shape::Heart | Shape::Picture(_) => false,
         Shape::Ring { inner } => add_number(ui, &Number::new("Hole", "Its radius", 0.0..=0.95, 2), inner),
@@ -40,18 +40,18 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
         Shape::Star { points } => add_integer(ui, "Points", points),
     };
     if changed {
-        sheet.look.aperture.shape = shape;
-        sheet.mark_changed(true, "aperture");
+        form.look.aperture.shape = shape;
+        form.mark_changed(true, "aperture");
     }
     let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
-    let (intensity, rim, highlights) = (sheet.look.aperture.intensity, sheet.look.rim, sheet.look.highlights);
+    let (intensity, rim, highlights) = (form.look.aperture.intensity, form.look.rim, form.look.highlights);
     let how = Number::new("Bubble to soft", hint, -1.0..=1.0, 2);
-    sheet.add_number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
+    form.add_number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
     let how = Number::new("Soft edge", "As a share of the radius", 0.0..=1.0, 2);
-    sheet.add_number(ui, &how, rim, |look, rim| look.rim = rim);
+    form.add_number(ui, &how, rim, |look, rim| look.rim = rim);
     let hint = "Brightness of lights, as a multiple of white; 0 is off";
     let how = Number::new("Brighter lights", hint, 0.0..=50.0, 1).with_affixes("", "×");
-    sheet.add_number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
+    form.add_number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
 
 /// Adds an integer number of blades or points. Returns whether it changed.
@@ -63,27 +63,27 @@ fn add_integer(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
 }
 
 /// Adds the row of shape thumbnails.
-fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbnails: &mut Thumbnails) {
-    let chosen = index_of(&sheet.look.aperture.shape);
+fn shape_row(ui: &mut Ui, form: &mut PanelForm, thumbnails: &mut Thumbnails) {
+    let chosen = index_of(&form.look.aperture.shape);
     let no_drag = !ui.input(|input| input.pointer.any_down());
     let mut shapes = RadioGroup::default();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = Vec2::splat(4.0);
         for (index, name) in SHAPES.into_iter().enumerate() {
-            let Some(shape) = shape_at(index, &sheet.look) else { continue };
+            let Some(shape) = shape_at(index, &form.look) else { continue };
             let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());
             let is_chosen = index == chosen;
             response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, tr(name)));
-            let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
+            let aperture = Aperture { shape, intensity: form.look.aperture.intensity };
             // Rendering thumbnails is slow: during a drag, only the selected shape's is updated.
-            let texture = thumbnails.get_or_render(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
+            let texture = thumbnails.get_or_render(ui, index, &aperture, form.look.rim, no_drag || is_chosen);
             draw_thumbnail(ui, rect, texture, is_chosen, response.hovered());
             shapes.add(response.tooltip(name), aperture);
         }
     });
     if let Some(aperture) = shapes.selection(ui) {
-        sheet.look.aperture = aperture;
-        sheet.mark_changed(true, "shape");
+        form.look.aperture = aperture;
+        form.mark_changed(true, "shape");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use egui::{Role, Ui, WidgetInfo};
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Number, Tooltip, add_dropdown, add_path, add_remark, add_switch};
 use crate::services::PathKind;
 use crate::state::Action;
@@ -30,67 +30,61 @@ const DEFAULT_ZOOM: f32 = 1.5;
 const MIN_ZOOM: f32 = 1.1;
 
 /// Adds the list of backgrounds.
-pub fn add_background_choice(ui: &mut Ui, sheet: &mut Sheet) {
-    let kind = match sheet.look.background {
+pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
+    let kind = match form.look.background {
         Background::Blur => BackgroundKind::Blurred,
         Background::Color(_) => BackgroundKind::Color,
         Background::Picture(_) => BackgroundKind::Picture,
     };
-    let named = match &sheet.state.first_look.background {
+    let named = match &form.state.first_look.background {
         Background::Picture(picture) => Some(Background::Picture(picture.clone())),
         _ => None,
     };
     let shown = KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name));
     let shown = tr_with("Background: {}", &[&shown]);
     let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
-    let enabled = sheet.follows_depth();
+    let enabled = form.follows_depth();
     let chosen = ui.add_enabled_ui(enabled, |ui| add_dropdown(ui, "Background", &shown, all, &kind)).inner;
     if let Some(chosen) = chosen {
         match (chosen, named) {
-            (BackgroundKind::Blurred, _) => sheet.look.background = Background::Blur,
-            (BackgroundKind::Color, _) => sheet.look.background = Background::Color(GREEN),
-            (BackgroundKind::Picture, Some(named)) => sheet.look.background = named,
-            (BackgroundKind::Picture, None) => sheet.push_action(Action::Browse(PathKind::Background)),
+            (BackgroundKind::Blurred, _) => form.look.background = Background::Blur,
+            (BackgroundKind::Color, _) => form.look.background = Background::Color(GREEN),
+            (BackgroundKind::Picture, Some(named)) => form.look.background = named,
+            (BackgroundKind::Picture, None) => form.push_action(Action::Browse(PathKind::Background)),
         }
-        sheet.mark_changed(true, "behind");
+        form.mark_changed(true, "behind");
     }
 }
 
 /// Adds the options of the selected background, and auto-framing.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    match sheet.look.background.clone() {
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    match form.look.background.clone() {
         Background::Blur => {}
         Background::Picture(picture) => {
             picture.file.iter().for_each(|file| add_path(ui, &file.display().to_string()));
-            sheet.add_button(
-                ui,
-                "Choose picture…",
-                "Another picture of your own",
-                Action::Browse(PathKind::Background),
-            );
+            form.add_button(ui, "Choose picture…", "Another picture of your own", Action::Browse(PathKind::Background));
         }
         Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.tooltip("Another colour").changed() {
-                sheet.look.background = Background::Color(color);
-                sheet.mark_changed(true, "colour behind");
+                form.look.background = Background::Color(color);
+                form.mark_changed(true, "colour behind");
             }
         })),
     }
-    let zoom = sheet.look.follow.zoom();
+    let zoom = form.look.follow.zoom();
     let hint = "Recordings and calls show a part of the picture, with the subject in the middle";
     if add_switch(ui, "Follow the subject", hint, zoom.is_some()) {
-        sheet.look.follow = if zoom.is_some() { FramingZoom::OFF } else { FramingZoom::from_zoom(DEFAULT_ZOOM) };
-        sheet.mark_changed(true, "follow");
+        form.look.follow = if zoom.is_some() { FramingZoom::OFF } else { FramingZoom::from_zoom(DEFAULT_ZOOM) };
+        form.mark_changed(true, "follow");
     }
     // `zoom` is from before the click, so the slider appears in the next pass.
     if let Some(zoom) = zoom {
         let how =
             Number::new("Largest zoom", "Largest magnification of the subject", MIN_ZOOM..=FramingZoom::MAX_ZOOM, 1);
-        sheet
-            .add_number(ui, &how.with_affixes("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
+        form.add_number(ui, &how.with_affixes("", "×"), zoom, |look, zoom| look.follow = FramingZoom::from_zoom(zoom));
         add_remark(ui, "Recordings and calls show the part in the dashed line; this window shows the whole picture.");
     }
 }

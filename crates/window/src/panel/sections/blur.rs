@@ -2,7 +2,7 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Number, add_choice, add_remark};
 use crate::state::tweak::{
     DEFAULT_LENS, F_NUMBER_RANGE, coc_fraction, f_number_for_coc, lens_coc_fraction, lens_for_look,
@@ -18,43 +18,43 @@ const MODES: [(&str, &str, bool); 2] = [
 ];
 
 /// Adds the mode and its parameters.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    let follows_depth = sheet.follows_depth();
-    let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
-    if (follows_depth || by_lens) && !sheet.is_relative() {
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    let follows_depth = form.follows_depth();
+    let by_lens = matches!(form.look.strength, Strength::Lens(_));
+    if (follows_depth || by_lens) && !form.is_relative() {
         let chosen = add_choice(ui, "Blur by", &MODES, by_lens, |by_lens| !by_lens || follows_depth);
-        let focus_m = sheet.state.focus_distance_m();
-        match (chosen, sheet.look.strength) {
-            (Some(true), _) => sheet.look.strength = Strength::Lens(lens_for_look(&sheet.look, focus_m, sheet.size)),
+        let focus_m = form.state.focus_distance_m();
+        match (chosen, form.look.strength) {
+            (Some(true), _) => form.look.strength = Strength::Lens(lens_for_look(&form.look, focus_m, form.size)),
             (Some(false), Strength::Lens(lens)) => {
-                sheet.look.strength = Strength::from_fraction(lens_coc_fraction(lens, focus_m, sheet.size));
+                form.look.strength = Strength::from_fraction(lens_coc_fraction(lens, focus_m, form.size));
             }
             _ => {}
         }
-        sheet.mark_changed(chosen.is_some(), "blur by");
+        form.mark_changed(chosen.is_some(), "blur by");
     }
-    match sheet.look.strength {
-        Strength::Lens(lens) => lens_numbers(ui, sheet, lens),
-        Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => amount_number(ui, sheet),
+    match form.look.strength {
+        Strength::Lens(lens) => lens_numbers(ui, form, lens),
+        Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => amount_number(ui, form),
     }
 }
 
 /// Adds the strength as a percentage, with a comparable lens.
-fn amount_number(ui: &mut Ui, sheet: &mut Sheet) {
-    let Some(fraction) = coc_fraction(&sheet.look, sheet.size.1) else { return };
+fn amount_number(ui: &mut Ui, form: &mut PanelForm) {
+    let Some(fraction) = coc_fraction(&form.look, form.size.1) else { return };
     let hint = "Radius of a far light, relative to the picture's height. The wheel over the picture does the same";
     let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).with_affixes("", " %");
-    sheet.add_number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
-    if sheet.follows_depth() && sheet.state.focus_m.is_some() && !sheet.is_relative() {
-        add_remark(ui, &equivalent_lens(sheet));
+    form.add_number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
+    if form.follows_depth() && form.state.focus_m.is_some() && !form.is_relative() {
+        add_remark(ui, &equivalent_lens(form));
     }
 }
 
 /// Returns a text with the f-number at which [`DEFAULT_LENS`] would blur equally at the current focus distance.
-fn equivalent_lens(sheet: &Sheet) -> String {
-    let fraction = coc_fraction(&sheet.look, sheet.size.1).unwrap_or_default();
+fn equivalent_lens(form: &PanelForm) -> String {
+    let fraction = coc_fraction(&form.look, form.size.1).unwrap_or_default();
     let (f_number, focal_mm) =
-        (f_number_for_coc(fraction, sheet.state.focus_distance_m(), sheet.size), DEFAULT_LENS.focal_length_mm);
+        (f_number_for_coc(fraction, form.state.focus_distance_m(), form.size), DEFAULT_LENS.focal_length_mm);
     if f_number.is_finite() && f_number < 64.0 {
         tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format!("{f_number:.1}")])
     } else {
@@ -63,21 +63,21 @@ fn equivalent_lens(sheet: &Sheet) -> String {
 }
 
 /// Adds the lens parameters.
-fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, lens: Lens) {
+fn lens_numbers(ui: &mut Ui, form: &mut PanelForm, lens: Lens) {
     let how = Number::new("Aperture", "f-number: smaller means more blur", F_NUMBER_RANGE, 1)
         .with_affixes("f/", "")
         .logarithmic();
-    sheet.add_number(ui, &how, lens.f_number, |look, f_number| {
+    form.add_number(ui, &how, lens.f_number, |look, f_number| {
         look.strength = Strength::Lens(Lens { f_number, ..lens })
     });
     let how =
         Number::new("Focal length", "Longer means more blur", 14.0..=200.0, 0).with_affixes("", " mm").logarithmic();
-    sheet.add_number(ui, &how, lens.focal_length_mm, |look, focal_length_mm| {
+    form.add_number(ui, &how, lens.focal_length_mm, |look, focal_length_mm| {
         look.strength = Strength::Lens(Lens { focal_length_mm, ..lens });
     });
     let hint = "36 mm is full frame; smaller means more blur";
     let how = Number::new("Sensor width", hint, 4.0..=54.0, 1).with_affixes("", " mm").logarithmic();
-    sheet.add_number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
+    form.add_number(ui, &how, lens.sensor_width_mm, |look, sensor_width_mm| {
         look.strength = Strength::Lens(Lens { sensor_width_mm, ..lens });
     });
 }

@@ -2,7 +2,7 @@
 
 use egui::{Align, Button, Layout, Role, Sense, Slider, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, vec2};
 
-use super::{Sheet, backdrop};
+use super::{PanelForm, backdrop};
 use crate::panel::dock::{CELL, CELL_GAP, CELLS};
 use crate::panel::widgets::{Tooltip, add_dropdown, add_switch};
 use crate::panel::{icons, theme::Colors};
@@ -14,9 +14,9 @@ use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
 pub const MORE: &str = "More";
 
 /// Draws the controls in `columns` columns.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
+pub fn show(ui: &mut Ui, form: &mut PanelForm, columns: usize) {
     let width = ((ui.available_width() - CELL_GAP * (columns - 1) as f32) / columns as f32).max(20.0);
-    let cells: [fn(&mut Ui, &mut Sheet); CELLS] = [
+    let cells: [fn(&mut Ui, &mut PanelForm); CELLS] = [
         add_source_list,
         add_portrait_switch,
         add_blur_slider,
@@ -35,7 +35,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
                         ui.set_max_width(width);
                         ui.spacing_mut().combo_width = width;
                         ui.spacing_mut().interact_size.y = CELL;
-                        cell(ui, sheet);
+                        cell(ui, form);
                     });
                 }
             });
@@ -44,32 +44,32 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, columns: usize) {
 }
 
 /// Adds the list of sources.
-fn add_source_list(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
+fn add_source_list(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
     let shown = match state.title() {
         "" => tr("the first camera"),
         title => title,
     };
     let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
     if let Some(name) = add_dropdown(ui, "Camera", shown, sources, &&state.source_name[..]) {
-        sheet.push_action(Action::Open(name.to_owned()));
+        form.push_action(Action::Open(name.to_owned()));
     }
 }
 
 /// Adds the switch for blur by depth.
-fn add_portrait_switch(ui: &mut Ui, sheet: &mut Sheet) {
-    let on = sheet.follows_depth() && sheet.has_depth();
+fn add_portrait_switch(ui: &mut Ui, form: &mut PanelForm) {
+    let on = form.follows_depth() && form.has_depth();
     let hint = "More blur, the farther from the subject in focus";
     if add_switch(ui, "Portrait", hint, on) {
-        sheet.push_action(Action::Portrait(!on));
+        form.push_action(Action::Portrait(!on));
     }
 }
 
 /// Adds the slider for the blur strength.
-fn add_blur_slider(ui: &mut Ui, sheet: &mut Sheet) {
-    let focus_m = sheet.state.focus_distance_m();
-    let fraction = tweak::blur_fraction(&sheet.look, focus_m, sheet.size);
-    let enabled = sheet.look.effect != Effect::None;
+fn add_blur_slider(ui: &mut Ui, form: &mut PanelForm) {
+    let focus_m = form.state.focus_distance_m();
+    let fraction = tweak::blur_fraction(&form.look, focus_m, form.size);
+    let enabled = form.look.effect != Effect::None;
     ui.add_enabled_ui(enabled, |ui| {
         let name = ui.label(tr("Blur"));
         ui.spacing_mut().slider_width = ui.available_width().max(10.0);
@@ -81,19 +81,19 @@ fn add_blur_slider(ui: &mut Ui, sheet: &mut Sheet) {
             .tooltip("How much the background is blurred. The mouse wheel over the picture does the same")
             .changed()
         {
-            tweak::set_blur_fraction(&mut sheet.look, percent / 100.0, focus_m, sheet.size);
-            sheet.mark_changed(true, "Amount of blur");
+            tweak::set_blur_fraction(&mut form.look, percent / 100.0, focus_m, form.size);
+            form.mark_changed(true, "Amount of blur");
         }
     });
 }
 
 /// Adds the buttons for recordings and snapshots.
-fn add_save_buttons(ui: &mut Ui, sheet: &mut Sheet) {
-    let recording = sheet.state.recording().is_some();
+fn add_save_buttons(ui: &mut Ui, form: &mut PanelForm) {
+    let recording = form.state.recording().is_some();
     let snapshot = icons::ICON_SIZE + 18.0;
     let record = vec2((ui.available_width() - snapshot - CELL_GAP).max(10.0), CELL);
     if add_record_button(ui, recording, record) {
-        sheet.push_action(Action::Record(!recording));
+        form.push_action(Action::Record(!recording));
     }
     let (rect, response) = ui.allocate_exact_size(vec2(snapshot, CELL), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr("Snapshot")));
@@ -101,7 +101,7 @@ fn add_save_buttons(ui: &mut Ui, sheet: &mut Sheet) {
     ui.painter().rect_filled(rect, 8, colors.fill(false, response.hovered()));
     icons::draw_camera(ui.painter(), rect.center(), colors.text);
     if response.tooltip("Snapshot: save this picture (S)").clicked() {
-        sheet.push_action(Action::Snapshot);
+        form.push_action(Action::Snapshot);
     }
 }
 
@@ -125,24 +125,24 @@ fn add_record_button(ui: &mut Ui, on: bool, size: Vec2) -> bool {
 }
 
 /// Adds the switch for the virtual camera.
-fn add_virtual_camera_switch(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
+fn add_virtual_camera_switch(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
     let current = state.virtual_camera();
     let hint = "Other programs see this picture as a camera's (O)";
     if add_switch(ui, "Use in calls", hint, current.is_some()) {
         let first = state.virtual_cameras.first().map(|camera| camera.name.clone());
-        sheet.push_action(Action::VirtualCamera(if current.is_some() { None } else { first }));
+        form.push_action(Action::VirtualCamera(if current.is_some() { None } else { first }));
     }
 }
 
 /// Adds the button that expands the panel.
-fn add_more_button(ui: &mut Ui, sheet: &mut Sheet) {
-    let open = sheet.state.is_expanded();
+fn add_more_button(ui: &mut Ui, form: &mut PanelForm) {
+    let open = form.state.is_expanded();
     let text = tr_with(if open { "{} Less" } else { "{} More" }, &[&if open { "−" } else { "+" }]);
     let button = Button::new(text).truncate().min_size(vec2(ui.available_width(), CELL));
     let button = ui.add(button).tooltip("All other settings");
     button.widget_info(|| WidgetInfo::selected(Role::Button, true, open, tr(MORE)));
     if button.clicked() {
-        sheet.push_action(Action::Section(MORE, !open));
+        form.push_action(Action::Section(MORE, !open));
     }
 }

@@ -2,17 +2,17 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Number, add_remark};
 use crate::state::tweak::{FOCUS_DISTANCE_RANGE_M, FOCUS_RANGE_LIMITS_M};
 use crate::texts::tr_with;
 use bokehcam::depth::focus::FocusRule;
 
 /// Adds the focus rule, its distance, and the focus range.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    let focus = sheet.look.focus;
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    let focus = form.look.focus;
     // A default if no frame with depth has arrived yet.
-    let now_m = sheet.state.focus_distance_m();
+    let now_m = form.state.focus_distance_m();
     let (is_point, metres) = match focus {
         FocusRule::Metres(metres) => (false, metres),
         FocusRule::Point { .. } | FocusRule::Track { .. } => (true, now_m),
@@ -28,19 +28,19 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         ("Point", "A point of the picture: click there. Double-click on a thing to follow it", point),
         ("Distance", "A distance in metres", distance),
     ];
-    let in_metres = !sheet.is_relative();
+    let in_metres = !form.is_relative();
     let rules = if in_metres { &rules[..] } else { &rules[..2] };
-    sheet.add_choice(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
+    form.add_choice(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
     if in_metres {
         let hint = "Distance of the focal plane. Move the slider to set it";
         let how = Number::new("Distance", hint, FOCUS_DISTANCE_RANGE_M, 2).with_affixes("", " m").logarithmic();
-        sheet.add_number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
+        form.add_number(ui, &how, metres, |look, metres| look.focus = FocusRule::Metres(metres));
         // Displayed as half the range on either side of the focal plane.
         let half_m = *FOCUS_RANGE_LIMITS_M.start() / 2.0..=*FOCUS_RANGE_LIMITS_M.end() / 2.0;
         let hint = "Range that stays as sharp as the focal plane, in front of it and behind";
         let how = Number::new("Depth of the sharp range", hint, half_m, 2).with_affixes("±", " m");
-        sheet.add_number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
-        let half_m = sheet.look.focus_range_m / 2.0;
+        form.add_number(ui, &how, form.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
+        let half_m = form.look.focus_range_m / 2.0;
         if half_m > 0.0 {
             let [from, to] = [(metres - half_m).max(0.0), metres + half_m].map(|metres| format!("{metres:.2}"));
             add_remark(ui, &tr_with("Sharp from {} m to {} m", &[&from, &to]));

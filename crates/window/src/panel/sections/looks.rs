@@ -5,7 +5,7 @@ use egui::{
     vec2,
 };
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::theme::{Colors, medium_font};
 use crate::panel::widgets::{RadioGroup, Tooltip, add_button, add_remark, set_accessible_name};
 use crate::state::Action;
@@ -49,8 +49,8 @@ impl PresetEditor {
 }
 
 /// Adds the presets, and the dialogs to save, rename and delete the user's own.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) {
-    let state = sheet.state;
+pub fn show(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor) {
+    let state = form.state;
     // Each dialog returns its next state; the buttons above it take effect in the next pass.
     let current = std::mem::take(&mut editing.dialog);
     let mut next = None;
@@ -60,11 +60,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) {
             let (mut chips, in_use) = (RadioGroup::default(), state.preset_in_use());
             for (index, preset) in state.presets.iter().enumerate() {
                 let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
-                let possible = !needs_depth || sheet.has_depth();
+                let possible = !needs_depth || form.has_depth();
                 chips.add(draw_chip(ui, index, preset, in_use == Some(index), possible), preset);
             }
             if let Some(preset) = chips.selection(ui) {
-                sheet.push_action(Action::Preset(preset.name.clone()));
+                form.push_action(Action::Preset(preset.name.clone()));
             }
             if current != Dialog::Saving && add_button(ui, "Save as…", "Save this look under a name") {
                 next = Some(Dialog::Saving);
@@ -77,10 +77,10 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) {
     });
     editing.dialog = match current {
         Dialog::Nothing => Dialog::Nothing,
-        Dialog::Saving => show_save_dialog(ui, sheet, editing),
-        Dialog::Listing => show_list_dialog(ui, sheet, editing),
-        Dialog::Renaming(name) => show_rename_dialog(ui, sheet, editing, name),
-        Dialog::Deleting(name) => show_delete_dialog(ui, sheet, name),
+        Dialog::Saving => show_save_dialog(ui, form, editing),
+        Dialog::Listing => show_list_dialog(ui, form, editing),
+        Dialog::Renaming(name) => show_rename_dialog(ui, form, editing, name),
+        Dialog::Deleting(name) => show_delete_dialog(ui, form, name),
     };
     if let Some(next) = next {
         editing.open_dialog(ui, next, "");
@@ -88,12 +88,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) {
 }
 
 /// Asks for the name of a new preset. An existing preset is replaced only by an explicit button press, not by Enter.
-fn show_save_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) -> Dialog {
-    let is_there =
-        sheet.state.presets.iter().any(|preset| preset.is_user_defined && preset.name == editing.name.trim());
+fn show_save_dialog(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor) -> Dialog {
+    let is_there = form.state.presets.iter().any(|preset| preset.is_user_defined && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
-    match add_name_field(ui, editing, verb, (by_enter, sheet.is_cancelled(ui))) {
-        Some(true) => sheet.push_action(Action::SavePreset(editing.name.trim().to_owned())),
+    match add_name_field(ui, editing, verb, (by_enter, form.is_cancelled(ui))) {
+        Some(true) => form.push_action(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
             if is_there {
@@ -106,8 +105,8 @@ fn show_save_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor) 
 }
 
 /// Lists the user's presets with their actions.
-fn show_list_dialog(ui: &mut Ui, sheet: &Sheet, editing: &mut PresetEditor) -> Dialog {
-    for preset in sheet.state.presets.iter().filter(|preset| preset.is_user_defined) {
+fn show_list_dialog(ui: &mut Ui, form: &PanelForm, editing: &mut PresetEditor) -> Dialog {
+    for preset in form.state.presets.iter().filter(|preset| preset.is_user_defined) {
         let row = ui.horizontal(|ui| {
             let [rename, delete] = ["Rename", "Delete"].map(|verb| {
                 let button = ui.button(tr(verb));
@@ -126,13 +125,13 @@ fn show_list_dialog(ui: &mut Ui, sheet: &Sheet, editing: &mut PresetEditor) -> D
             _ => {}
         }
     }
-    if sheet.is_cancelled(ui) { Dialog::Nothing } else { Dialog::Listing }
+    if form.is_cancelled(ui) { Dialog::Nothing } else { Dialog::Listing }
 }
 
-fn show_rename_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor, old: String) -> Dialog {
+fn show_rename_dialog(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor, old: String) -> Dialog {
     let new = editing.name.trim().to_owned();
-    match add_name_field(ui, editing, "Rename", (true, sheet.is_cancelled(ui))) {
-        Some(true) if new != old => sheet.push_action(Action::RenamePreset(old, new)),
+    match add_name_field(ui, editing, "Rename", (true, form.is_cancelled(ui))) {
+        Some(true) if new != old => form.push_action(Action::RenamePreset(old, new)),
         Some(_) => {}
         None => return Dialog::Renaming(old),
     }
@@ -140,13 +139,13 @@ fn show_rename_dialog(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor
 }
 
 /// Asks before deleting a preset, because this cannot be undone.
-fn show_delete_dialog(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Dialog {
+fn show_delete_dialog(ui: &mut Ui, form: &mut PanelForm, name: String) -> Dialog {
     ui.label(tr_with("Delete “{}” for good?", &[&name]));
     let (delete, keep) =
         ui.horizontal_wrapped(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
-        sheet.push_action(Action::DeletePreset(name));
-    } else if !keep && !sheet.is_cancelled(ui) {
+        form.push_action(Action::DeletePreset(name));
+    } else if !keep && !form.is_cancelled(ui) {
         return Dialog::Deleting(name);
     }
     Dialog::Listing

@@ -22,7 +22,7 @@ use super::widgets::{Number, add_button, add_choice, add_foldable_section, add_n
 use bokehcam::look::{Effect, Look};
 
 /// Data that the sections read and change while they are drawn.
-pub struct Sheet<'a> {
+pub struct PanelForm<'a> {
     /// The current state.
     pub state: &'a State,
     /// A copy of the look, which the controls change.
@@ -35,7 +35,7 @@ pub struct Sheet<'a> {
     pub actions: &'a mut Vec<Action>,
 }
 
-impl Sheet<'_> {
+impl PanelForm<'_> {
     /// Records that the control `stroke` changed the look, if `has_changed`.
     fn mark_changed(&mut self, has_changed: bool, stroke: &'static str) {
         if has_changed {
@@ -104,42 +104,48 @@ impl Sheet<'_> {
 }
 
 /// Draws the sections that apply to the look and the source, in the order look, input and output, window.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut PresetEditor, thumbnails: &mut Thumbnails) {
+pub fn show(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor, thumbnails: &mut Thumbnails) {
     ui.add_space(4.0);
-    looks::show(ui, sheet, editing);
+    looks::show(ui, form, editing);
     ui.add_space(2.0);
-    effect::show(ui, sheet);
-    if sheet.follows_depth() {
-        add_section(ui, sheet, "Focus", true, focus::show);
+    effect::show(ui, form);
+    if form.follows_depth() {
+        add_section(ui, form, "Focus", true, focus::show);
     }
     // Sections without effect on the current look are omitted.
-    let blurs = sheet.look.effect != Effect::None;
+    let blurs = form.look.effect != Effect::None;
     if blurs {
-        add_section(ui, sheet, "Blur", true, blur::show);
-        add_section(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbnails));
+        add_section(ui, form, "Blur", true, blur::show);
+        add_section(ui, form, "Aperture", true, |ui, form| aperture::show(ui, form, thumbnails));
     }
-    if sheet.follows_depth() {
-        add_section(ui, sheet, "Background", false, backdrop::show);
+    if form.follows_depth() {
+        add_section(ui, form, "Background", false, backdrop::show);
     }
-    add_section(ui, sheet, "Source", true, source::show);
-    add_section(ui, sheet, "Record and call", true, output::show);
-    add_section(ui, sheet, "View", true, view::show);
-    if !sheet.state.controls.is_empty() {
-        add_section(ui, sheet, "Controls of the camera", false, source::add_controls);
+    add_section(ui, form, "Source", true, source::show);
+    add_section(ui, form, "Record and call", true, output::show);
+    add_section(ui, form, "View", true, view::show);
+    if !form.state.controls.is_empty() {
+        add_section(ui, form, "Controls of the camera", false, source::add_controls);
     }
-    add_section(ui, sheet, "For experts", false, |ui, sheet| {
-        view::add_internals(ui, sheet);
+    add_section(ui, form, "For experts", false, |ui, form| {
+        view::add_internals(ui, form);
         if blurs {
-            quality::show(ui, sheet);
+            quality::show(ui, form);
         }
-        source::add_executor(ui, sheet);
+        source::add_executor(ui, form);
     });
 }
 
 /// Draws a section, folded as the user left it; `open` is the default.
-fn add_section(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
-    let open = sheet.state.preferences.sections.get(name).copied().unwrap_or(open);
-    if add_foldable_section(ui, name, open, |ui| body(ui, sheet)) {
-        sheet.push_action(Action::Section(name, !open));
+fn add_section(
+    ui: &mut Ui,
+    form: &mut PanelForm,
+    name: &'static str,
+    open: bool,
+    body: impl FnOnce(&mut Ui, &mut PanelForm),
+) {
+    let open = form.state.preferences.sections.get(name).copied().unwrap_or(open);
+    if add_foldable_section(ui, name, open, |ui| body(ui, form)) {
+        form.push_action(Action::Section(name, !open));
     }
 }

@@ -2,29 +2,29 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Tooltip, add_dropdown, add_path, add_remark};
 use crate::state::{Action, NO_VIRTUAL_CAMERA};
 use crate::texts::tr;
 
 /// Adds the self-timer, camera off, snapshot options, the command line, and the virtual camera.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
     if let Some(output) = state.recording().filter(|output| !output.name.is_empty()) {
         add_path(ui, &output.name);
     }
-    sheet.add_switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
+    form.add_switch(ui, "Timer", "A snapshot in three seconds (Shift+S)", state.self_timer, Action::SelfTimer);
     let hint = "No picture leaves this program, and the camera is off: others see a still card";
-    sheet.add_switch(ui, "Camera off", hint, state.off, Action::Off);
+    form.add_switch(ui, "Camera off", hint, state.off, Action::Off);
     let hint = "Also saves the picture before the blur and its depth: `render --like` makes the snapshot again";
-    sheet.add_switch(ui, "Reproducible snapshots", hint, state.preferences.keep_sources, Action::KeepSources);
+    form.add_switch(ui, "Reproducible snapshots", hint, state.preferences.keep_sources, Action::KeepSources);
     ui.horizontal_wrapped(|ui| {
         let hint = "Copy the equivalent command line to the clipboard (K)";
-        sheet.add_button(ui, "Copy command", hint, Action::CopyCommand);
+        form.add_button(ui, "Copy command", hint, Action::CopyCommand);
         if let Some(folder) = &state.saved_in {
             let open = ui.button(tr("Open folder")).on_hover_text(folder.display().to_string());
             if open.clicked() {
-                sheet.push_action(Action::OpenFolder);
+                form.push_action(Action::OpenFolder);
             }
         }
     });
@@ -44,6 +44,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         .find(|camera| camera.2 == current)
         .map_or_else(|| current.unwrap_or_default().to_owned(), |camera| camera.0.clone());
     if let Some(camera) = add_dropdown(ui, "Camera for calls", &shown, all, &current) {
-        sheet.push_action(Action::VirtualCamera(camera.map(str::to_owned)));
+        form.push_action(Action::VirtualCamera(camera.map(str::to_owned)));
     }
 }

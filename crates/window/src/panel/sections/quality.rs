@@ -2,22 +2,22 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::add_dropdown;
 use crate::texts::tr;
 use bokehcam::budget::Quality;
 
 /// Adds the list of quality levels; automatic selection follows the time budget.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let name = |quality: Option<Quality>| match quality {
         None => tr("Auto: as the time allows").to_owned(),
         Some(quality) => quality.to_string(),
     };
     ui.label(tr("Quality"));
-    let quality = sheet.look.quality;
+    let quality = form.look.quality;
     let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
     if let Some(quality) = add_dropdown(ui, "Quality", &name(quality), levels, &quality) {
-        sheet.look.quality = quality;
-        sheet.mark_changed(true, "quality");
+        form.look.quality = quality;
+        form.mark_changed(true, "quality");
     }
 }

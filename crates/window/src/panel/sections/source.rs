@@ -2,7 +2,7 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Number, add_choice, add_dropdown, add_number, add_remark, add_switch};
 use crate::services::PathKind;
 use crate::state::{Action, DepthMethod, Source};
@@ -24,8 +24,8 @@ const DEPTH_METHODS: [(&str, &str, DepthMethod); 5] = [
 ];
 
 /// Adds the source's properties, its depth methods, and buttons to open another source.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
     match &state.source {
         Source::Opening => add_remark(ui, "Opening…"),
         Source::Running(running) => {
@@ -56,35 +56,35 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
                     |_| true,
                 );
                 if let Some(method) = chosen.flatten().filter(|method| Some(*method) != running.depth_method) {
-                    sheet.push_action(Action::SetDepthMethod(method));
+                    form.push_action(Action::SetDepthMethod(method));
                 }
             }
         }
         Source::Lost(why) => add_remark(ui, &tr_with("Lost: {}", &[why])),
         Source::Ended => add_remark(ui, "It has ended."),
     }
-    add_modes(ui, sheet);
+    add_modes(ui, form);
     let hint = "You can also drop it on the window";
     ui.horizontal_wrapped(|ui| {
-        sheet.add_button(ui, "Open folder…", hint, Action::Browse(PathKind::Folder));
-        sheet.add_button(ui, "Open photo…", hint, Action::Browse(PathKind::Photo));
+        form.add_button(ui, "Open folder…", hint, Action::Browse(PathKind::Folder));
+        form.add_button(ui, "Open photo…", hint, Action::Browse(PathKind::Photo));
         if state.plate.is_some() {
             let hint = "A picture of the room without you; the camera must not move (T)";
-            sheet.add_button(ui, "Take another plate", hint, Action::CapturePlate);
+            form.add_button(ui, "Take another plate", hint, Action::CapturePlate);
         }
     });
 }
 
 /// Adds a description of the executor that blurs.
-pub fn add_executor(ui: &mut Ui, sheet: &Sheet) {
-    if let Source::Running(running) = &sheet.state.source {
+pub fn add_executor(ui: &mut Ui, form: &PanelForm) {
+    if let Source::Running(running) = &form.state.source {
         add_remark(ui, &running.executor);
     }
 }
 
 /// Adds lists of the camera's frame sizes and rates.
-fn add_modes(ui: &mut Ui, sheet: &mut Sheet) {
-    let (state, Source::Running(running)) = (sheet.state, &sheet.state.source) else { return };
+fn add_modes(ui: &mut Ui, form: &mut PanelForm) {
+    let (state, Source::Running(running)) = (form.state, &form.state.source) else { return };
     let Some(mode) = state.camera.modes.iter().find(|mode| mode.size == running.size) else { return };
     let now_fps = 1e9 / running.period_ns.max(1) as f64;
     let off_by = |fps: &f64| (fps - now_fps).abs();
@@ -104,17 +104,17 @@ fn add_modes(ui: &mut Ui, sheet: &mut Sheet) {
         })
         .inner;
     if let Some((size, fps)) = size.or(rate) {
-        sheet.push_action(Action::Mode(size, fps));
+        form.push_action(Action::Mode(size, fps));
     }
 }
 
 /// Adds the camera's driver controls.
-pub fn add_controls(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
+pub fn add_controls(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
     for control in &state.controls {
         let value = ui.add_enabled_ui(control.is_active, |ui| add_control(ui, control)).inner;
         if let Some(value) = value {
-            sheet.push_action(Action::Control(control.name.clone(), value));
+            form.push_action(Action::Control(control.name.clone(), value));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use egui::Ui;
 
-use super::Sheet;
+use super::PanelForm;
 use crate::panel::widgets::{Number, add_choice, add_number, add_remark};
 use crate::state::{Action, ViewMode};
 
@@ -18,25 +18,25 @@ const INTERNALS: Views = [
 ];
 
 /// Adds radio buttons for views; clicking the active one returns to the picture.
-fn add_view_choice(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
-    let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
+fn add_view_choice(ui: &mut Ui, form: &mut PanelForm, what: &str, views: Views) {
+    let (now, has_depth) = (form.state.shown, form.has_depth());
     if let Some(shown) = add_choice(ui, what, &views, now, |shown| has_depth || shown != ViewMode::Depth) {
-        sheet.push_action(Action::Show(if shown == now { ViewMode::Picture } else { shown }));
+        form.push_action(Action::Show(if shown == now { ViewMode::Picture } else { shown }));
     }
 }
 
 /// Adds the views of the blur's internals, and the instruments.
-pub fn add_internals(ui: &mut Ui, sheet: &mut Sheet) {
-    add_view_choice(ui, sheet, "Views of the blur", INTERNALS);
-    sheet.add_switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
+pub fn add_internals(ui: &mut Ui, form: &mut PanelForm) {
+    add_view_choice(ui, form, "Views of the blur", INTERNALS);
+    form.add_switch(ui, "Instruments", "Times, rates and drops (I)", form.state.instruments, Action::Instruments);
 }
 
 /// Adds the view, and options for its display.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
-    let state = sheet.state;
-    add_view_choice(ui, sheet, "Show", VIEWS);
+pub fn show(ui: &mut Ui, form: &mut PanelForm) {
+    let state = form.state;
+    add_view_choice(ui, form, "Show", VIEWS);
     let hint = "Like a mirror; recordings and calls are not mirrored (M)";
-    sheet.add_switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
+    form.add_switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {
         add_remark(ui, "Only this window is mirrored, not recordings and calls.");
     }
@@ -44,15 +44,15 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         true => ("Pause", "Pause the recording, and try looks on its picture (Z)"),
         false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
     };
-    sheet.add_switch(ui, freeze, hint, state.frozen, Action::Freeze);
+    form.add_switch(ui, freeze, hint, state.frozen, Action::Freeze);
     let hint = "Show the picture before the blur, left of a movable line (B)";
-    sheet.add_switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
+    form.add_switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
     if let Some(at) = state.split {
         let hint = "From the left; you can also drag the line on the picture";
         let mut percent = at * 100.0;
         if add_number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).with_affixes("", " %"), &mut percent) {
-            sheet.push_action(Action::Split(Some(percent / 100.0)));
+            form.push_action(Action::Split(Some(percent / 100.0)));
         }
     }
-    sheet.add_switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
+    form.add_switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
 }

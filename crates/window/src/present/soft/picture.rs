@@ -6,18 +6,18 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::present::{Area, Drawing, StaleTone};
 use bokehcam::frame::ColorImage;
-use bokehcam::frame::scale::Scale;
+use bokehcam::frame::scale::RowScaler;
 
 /// Paints pictures into an area, scaling them if needed; caches the scaling weights between frames.
 #[derive(Debug, Default)]
 pub struct Scaler {
-    scale: Scale,
+    scale: RowScaler,
 }
 
 /// Buffers for one thread.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// Buffer for [`Scale::row`].
+    /// Buffer for [`RowScaler::scale_row`].
     row: Vec<u16>,
     /// A scaled row, RGB.
     scaled: Vec<u8>,
@@ -29,7 +29,7 @@ impl Scaler {
         let [from, to] =
             [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
         if from != to {
-            self.scale.adapt(from, to);
+            self.scale.set_sizes(from, to);
         }
     }
 
@@ -62,7 +62,7 @@ impl Scaler {
                 &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
             } else {
                 scratch.scaled.resize(3 * from.len(), 0);
-                self.scale.row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.scaled);
+                self.scale.scale_row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.scaled);
                 &scratch.scaled[..]
             };
             arch.dispatch(ExpandRgb { rgb, row });

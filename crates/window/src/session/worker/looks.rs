@@ -70,11 +70,11 @@ impl SessionWorker {
                 let _ = path.parent().map(std::fs::create_dir_all);
                 write_color(path, picture, false).map(|()| path.to_owned())
             }
-            None => snapshot::save(&self.config.folders.pictures, &folders::stem(), &snapshot),
+            None => snapshot::save(&self.config.folders.pictures, &folders::timestamped_stem(), &snapshot),
         };
         let answer = match saved {
             Ok(path) => {
-                self.events.note(format!("Saved {}", folders::shown(&path)));
+                self.events.note(format!("Saved {}", folders::format_path(&path)));
                 self.events.report_saved(&path);
                 Ok(path)
             }

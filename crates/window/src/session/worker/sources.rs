@@ -7,7 +7,7 @@ use super::SessionWorker;
 use crate::services::PathKind;
 use crate::session::Command;
 use crate::state::{Request, Update};
-use bokehcam::files::whole;
+use bokehcam::files::atomic_file;
 use bokehcam::look::BackgroundSetting;
 
 /// Interval of checks for new devices and of the recording's size.
@@ -31,7 +31,7 @@ impl SessionWorker {
     /// Reports the current size of the recording.
     fn report_recording_size(&self) {
         let recording = self.config.outputs.iter().find(|output| !output.is_camera);
-        let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
+        let bytes = recording.and_then(|output| atomic_file::bytes_written(output.name.as_ref()));
         bytes.into_iter().for_each(|bytes| self.events.send_update(Update::RecordedBytes(bytes)));
     }
 

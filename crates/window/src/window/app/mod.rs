@@ -1,4 +1,4 @@
-//! The window's event loop.
+//! The window as `winit` runs it: receives the events, updates the state and draws.
 
 mod control;
 mod dropped_files;
@@ -34,7 +34,7 @@ use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{OutputRequest, View};
-use bokehcam::stats::WindowUse;
+use bokehcam::stats::WindowStats;
 
 /// Layout interval of the instruments while frames arrive.
 const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
@@ -215,9 +215,9 @@ impl App {
     }
 }
 
-fn window_use(state: &State) -> WindowUse {
+fn window_use(state: &State) -> WindowStats {
     let Totals { presented, first_frame_ns, latency, reaction, present } = &state.meters.totals;
-    WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
+    WindowStats::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 
 impl ApplicationHandler<UserEvent> for App {

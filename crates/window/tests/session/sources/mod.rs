@@ -46,7 +46,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
     watched.session.send(Request::StopOutput(output));
     let closed = watched.heard.session.close();
     assert_eq!(closed.output_error, None);
-    assert!(closed.report.unwrap().frames.balance());
+    assert!(closed.report.unwrap().frames.is_balanced());
     assert!(film.metadata().unwrap().len() > 48 * 32 * 3 / 2, "the film is there");
 }
 
@@ -90,7 +90,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
     watched.session.send(Request::Look(Box::new(stronger)));
     watched.frame("another look", |view| view.change > change && !view.is_transitional);
-    assert!(watched.heard.session.close().report.unwrap().frames.balance());
+    assert!(watched.heard.session.close().report.unwrap().frames.is_balanced());
 
     // Other names, a snapshot, and files that are no photos.
     let open = |path: &Path| {

@@ -18,30 +18,30 @@ const SUFFIX: &str = ".part";
 
 /// A file under construction. Dropping it removes the part file.
 #[derive(Debug)]
-pub struct Part {
+pub struct PartFile {
     /// The final path.
     path: PathBuf,
     /// The hidden path meanwhile.
     part: PathBuf,
     file: File,
     /// Whether the part file must be removed on drop.
-    open: bool,
+    remove_on_drop: bool,
 }
 
-impl Part {
+impl PartFile {
     /// Creates a part file for `path`, whose folder must exist.
     ///
     /// # Errors
     /// `path` has no file name, or the part file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let (folder, name) = split_path(path)?;
+        let (folder, name) = split_file_name(path)?;
         loop {
-            let part = folder.join(part_name(name));
+            let part = folder.join(create_part_name(name));
             let file = File::create_new(&part)?;
             flock(&file, FlockOperation::NonBlockingLockExclusive)?;
             // Before it was locked, another process may have removed it as an abandoned part.
             if part.symlink_metadata().is_ok() {
-                return Ok(Self { path: path.to_owned(), part, file, open: true });
+                return Ok(Self { path: path.to_owned(), part, file, remove_on_drop: true });
             }
         }
     }
@@ -51,7 +51,7 @@ impl Part {
         &self.path
     }
 
-    pub fn part(&self) -> &Path {
+    pub fn part_path(&self) -> &Path {
         &self.part
     }
 
@@ -69,27 +69,27 @@ impl Part {
         self.try_commit(replace)
     }
 
-    /// Does the same as [`Part::commit`], but on failure the part can still be [kept](Self::keep_incomplete).
+    /// Does the same as [`PartFile::commit`], but on failure the part can still be [kept](Self::keep_incomplete).
     ///
     /// # Errors
-    /// Same as for [`Part::commit`].
+    /// Same as for [`PartFile::commit`].
     pub fn try_commit(&mut self, replace: bool) -> io::Result<()> {
         if replace && let Ok(there) = fs::metadata(&self.path) {
             self.file.set_permissions(there.permissions())?;
         }
         self.file.sync_all()?;
         rename(&self.part, &self.path, replace)?;
-        self.open = false;
+        self.remove_on_drop = false;
         sync_folder(&self.path)
     }
 
-    /// Does the same as [`Part::commit`] without replacing and without sync: the caller syncs the file system later.
+    /// Does the same as [`PartFile::commit`] without replacing and without sync: the caller syncs the file system later.
     ///
     /// # Errors
-    /// Same as for [`Part::commit`].
+    /// Same as for [`PartFile::commit`].
     pub fn commit_unsynced(mut self) -> io::Result<()> {
         rename(&self.part, &self.path, false)?;
-        self.open = false;
+        self.remove_on_drop = false;
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl Part {
     /// The file was removed and cannot be copied: it is lost.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
         // From here on it must not be removed, even if it cannot be synced or renamed.
-        self.open = false;
+        self.remove_on_drop = false;
         let _ = self.file.sync_all();
         let Some(part) = self.current_path() else { return self.copy_incomplete() };
         let path = match part == self.part {
@@ -132,32 +132,32 @@ impl Part {
 
     /// Copies the file to the nearest existing folder: a file without a name cannot be linked again.
     fn copy_incomplete(&self) -> io::Result<PathBuf> {
-        let (folder, name) = split_path(&self.path)?;
+        let (folder, name) = split_file_name(&self.path)?;
         let folder = std::path::absolute(folder)?;
-        let left = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("/"));
-        let copy = Self::create(&left.join(name))?;
+        let existing = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("/"));
+        let copy = Self::create(&existing.join(name))?;
         // Warn first, as copying may take long.
-        tracing::warn!("{} was removed: its content so far is copied to {}", self.path.display(), left.display());
+        tracing::warn!("{} was removed: its content so far is copied to {}", self.path.display(), existing.display());
         io::copy(&mut File::open(self.descriptor_path())?, &mut copy.file())?;
         copy.keep_incomplete()
     }
 }
 
-impl Drop for Part {
+impl Drop for PartFile {
     fn drop(&mut self) {
-        if let Some(part) = self.open.then(|| self.current_path()).flatten() {
+        if let Some(part) = self.remove_on_drop.then(|| self.current_path()).flatten() {
             // A failure cannot be reported here.
             let _ = fs::remove_file(part);
         }
     }
 }
 
-/// Writes a file atomically; `replace` as for [`Part::commit`].
+/// Writes a file atomically; `replace` as for [`PartFile::commit`].
 ///
 /// # Errors
-/// Same as for [`Part::create`] and [`Part::commit`], or the file cannot be written.
+/// Same as for [`PartFile::create`] and [`PartFile::commit`], or the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8], replace: bool) -> io::Result<()> {
-    let part = Part::create(path)?;
+    let part = PartFile::create(path)?;
     part.file().write_all(bytes)?;
     part.commit(replace)
 }
@@ -206,12 +206,12 @@ pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Returns the bytes that this process has written so far for a file at `path`; `None` if it writes no such file.
-pub fn bytes_so_far(path: &Path) -> Option<u64> {
-    let (folder, name) = split_path(path).ok()?;
+pub fn bytes_written(path: &Path) -> Option<u64> {
+    let (folder, name) = split_file_name(path).ok()?;
     let own = format!(".{}-", std::process::id());
     let parts = fs::read_dir(folder).ok()?.flatten().filter(|entry| {
         let part = entry.file_name();
-        name_of_part(&part) == Some(name) && part.to_string_lossy().contains(&own)
+        parse_part_name(&part) == Some(name) && part.to_string_lossy().contains(&own)
     });
     parts.filter_map(|part| part.metadata().ok()).map(|part| part.len()).max()
 }
@@ -220,9 +220,9 @@ pub fn bytes_so_far(path: &Path) -> Option<u64> {
 ///
 /// # Errors
 /// The folder cannot be read.
-pub fn left_behind(path: &Path) -> io::Result<Vec<PathBuf>> {
-    let (folder, name) = split_path(path)?;
-    let all = all_left_behind(folder)?.into_iter();
+pub fn find_abandoned(path: &Path) -> io::Result<Vec<PathBuf>> {
+    let (folder, name) = split_file_name(path)?;
+    let all = find_all_abandoned(folder)?.into_iter();
     Ok(all.filter(|(_, of)| of == name).map(|(part, _)| part).collect())
 }
 
@@ -230,12 +230,12 @@ pub fn left_behind(path: &Path) -> io::Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// The folder cannot be read.
-pub fn all_left_behind(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
+pub fn find_all_abandoned(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name();
-        let Some(final_name) = name_of_part(&name).filter(|_| entry.file_type().is_ok_and(|kind| kind.is_file()))
+        let Some(final_name) = parse_part_name(&name).filter(|_| entry.file_type().is_ok_and(|kind| kind.is_file()))
         else {
             continue;
         };
@@ -250,14 +250,14 @@ pub fn all_left_behind(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
 
 /// Syncs the folder of `path`, so that the file's name is on disk as well.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
-    let (folder, _) = split_path(path)?;
+    let (folder, _) = split_file_name(path)?;
     // Not every file system can sync folders; the file itself is on disk.
     let _ = File::open(folder)?.sync_all();
     Ok(())
 }
 
 /// Splits a path into folder and file name.
-fn split_path(path: &Path) -> io::Result<(&Path, &OsStr)> {
+fn split_file_name(path: &Path) -> io::Result<(&Path, &OsStr)> {
     let name = path.file_name().ok_or_else(|| {
         io::Error::new(
             ErrorKind::InvalidInput,
@@ -270,7 +270,7 @@ fn split_path(path: &Path) -> io::Result<(&Path, &OsStr)> {
 }
 
 /// Returns a new part name: `.NAME.PROCESS-NUMBER.part`.
-fn part_name(name: &OsStr) -> OsString {
+fn create_part_name(name: &OsStr) -> OsString {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let mut part = OsString::from(".");
     part.push(name);
@@ -278,8 +278,8 @@ fn part_name(name: &OsStr) -> OsString {
     part
 }
 
-/// Returns the final name of a part file; `None` if the name does not have the form of [`part_name`].
-fn name_of_part(part: &OsStr) -> Option<&OsStr> {
+/// Returns the final name of a part file; `None` if the name does not have the form of [`create_part_name`].
+fn parse_part_name(part: &OsStr) -> Option<&OsStr> {
     let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;
     let (name, numbers) = part.split_at(part.iter().rposition(|&byte| byte == b'.')?);
     let mut numbers = numbers[1..].split(|&byte| byte == b'-');

@@ -13,12 +13,12 @@ fn names(dir: &Path) -> Vec<String> {
 fn a_file_appears_whole_or_not_at_all() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.txt");
-    let part = Part::create(&path).unwrap();
+    let part = PartFile::create(&path).unwrap();
     part.file().write_all(b"one").unwrap();
     assert!(!path.exists());
-    assert_eq!((bytes_so_far(&path), bytes_so_far(&dir.path().join("b.txt"))), (Some(3), None));
+    assert_eq!((bytes_written(&path), bytes_written(&dir.path().join("b.txt"))), (Some(3), None));
     drop(part);
-    assert_eq!(bytes_so_far(&path), None);
+    assert_eq!(bytes_written(&path), None);
     assert_eq!(names(dir.path()), Vec::<String>::new());
 
     write(&path, b"one", false).unwrap();
@@ -35,7 +35,7 @@ fn a_file_appears_whole_or_not_at_all() {
 fn two_writers_of_one_name_never_mix() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.y4m");
-    let (one, two) = (Part::create(&path).unwrap(), Part::create(&path).unwrap());
+    let (one, two) = (PartFile::create(&path).unwrap(), PartFile::create(&path).unwrap());
     one.file().write_all(b"one").unwrap();
     two.file().write_all(b"two").unwrap();
     one.commit(false).unwrap();
@@ -47,7 +47,7 @@ fn two_writers_of_one_name_never_mix() {
 fn parts_left_behind_are_found_and_no_others() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.mkv");
-    let alive = Part::create(&path).unwrap();
+    let alive = PartFile::create(&path).unwrap();
     let left = dir.path().join(".a.mkv.77-0.part");
     let foreign = [".a.mkv.part", ".a.mkv.7.part", ".a.mkv.x-1.part", ".b.mkv.7-1.part", "a.mkv.7-1.part"];
     fs::write(&left, "take").unwrap();
@@ -55,7 +55,7 @@ fn parts_left_behind_are_found_and_no_others() {
         fs::write(dir.path().join(name), "").unwrap();
     }
     symlink(dir.path().join("b"), dir.path().join(".a.mkv.8-0.part")).unwrap();
-    assert_eq!(left_behind(&path).unwrap(), std::slice::from_ref(&left));
+    assert_eq!(find_abandoned(&path).unwrap(), std::slice::from_ref(&left));
     let kept = keep_incomplete(&left, &path).unwrap();
     assert_eq!(kept, dir.path().join("a.incomplete.mkv"));
     alive.file().write_all(b"more").unwrap();

@@ -10,7 +10,7 @@ use super::xmp;
 
 /// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Extras {
+pub struct PhotoMetadata {
     /// ICC profile of its RGB values; `None` is sRGB.
     pub icc_profile: Option<Vec<u8>>,
     /// EXIF data, beginning with the TIFF header.
@@ -18,7 +18,7 @@ pub struct Extras {
     /// XMP packet, with rights and authors.
     pub xmp: Option<String>,
     /// What 8-bit RGB cannot hold, in words for a message.
-    pub left_behind: Vec<&'static str>,
+    pub lost_properties: Vec<&'static str>,
 }
 
 /// Maximum EXIF bytes in a JPEG: a segment has 65533, six of which are its identifier.
@@ -26,38 +26,38 @@ const MAX_JPEG_EXIF_BYTES: usize = 65_533 - 6;
 /// Maximum profile bytes in a JPEG: 255 segments, less 14 bytes of numbering each.
 const MAX_JPEG_ICC_BYTES: usize = 255 * (65_533 - 14);
 
-impl Extras {
+impl PhotoMetadata {
     /// Reads the metadata of a PNG as stored, before its palette is expanded.
-    pub(super) fn of_png(info: &png::Info) -> Self {
+    pub(super) fn from_png(info: &png::Info) -> Self {
         let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
-        let mut extras = Self { exif, ..Self::default() };
-        extras.set_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
+        let mut metadata = Self { exif, ..Self::default() };
+        metadata.set_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
         if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD) {
             let mut chunk = chunk.clone();
             // Limit decompression to a sensible size.
             let packet = chunk.decompress_text_with_limit(xmp::MAX_BYTES).and_then(|()| chunk.get_text());
-            extras.set_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
+            metadata.set_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
         }
         // Transparency is either a channel (2 or 4 samples) or a tRNS chunk.
         let alpha_is_in_trns = info.color_type == png::ColorType::Indexed || info.trns.is_some();
         if info.trns.is_some() || (!alpha_is_in_trns && info.color_type.samples().is_multiple_of(2)) {
-            extras.left_behind.push("transparency");
+            metadata.lost_properties.push("transparency");
         }
         if info.bit_depth == png::BitDepth::Sixteen {
-            extras.left_behind.push("16 bits a channel");
+            metadata.lost_properties.push("16 bits a channel");
         }
-        extras
+        metadata
     }
 
-    pub(super) fn of_jpeg<R: BufRead + Seek>(decoder: &mut JpegDecoder<R>) -> Self {
+    pub(super) fn from_jpeg<R: BufRead + Seek>(decoder: &mut JpegDecoder<R>) -> Self {
         // Unreadable metadata must not reject the picture.
         let exif = decoder.exif_metadata().ok().flatten();
-        let mut extras = Self { exif, ..Self::default() };
-        extras.set_profile(decoder.icc_profile().ok().flatten());
+        let mut metadata = Self { exif, ..Self::default() };
+        metadata.set_profile(decoder.icc_profile().ok().flatten());
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
-            extras.set_xmp(Ok(packet));
+            metadata.set_xmp(Ok(packet));
         }
-        extras
+        metadata
     }
 
     /// Keeps a profile only if it is for RGB: the pixels become RGB, so a grey or CMYK profile no longer applies.
@@ -66,7 +66,7 @@ impl Extras {
         const SPACE: std::ops::Range<usize> = 16..20;
         match profile {
             Some(profile) if profile.get(SPACE) != Some(b"RGB ") => {
-                self.left_behind.push("a colour profile that is not of RGB");
+                self.lost_properties.push("a colour profile that is not of RGB");
             }
             profile => self.icc_profile = profile,
         }
@@ -74,10 +74,10 @@ impl Extras {
 
     /// Keeps the parts of a packet that are still valid.
     fn set_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
-        self.left_behind.extend(packet.iter().flat_map(|packet| xmp::lost(packet)));
-        match packet.and_then(xmp::kept) {
+        self.lost_properties.extend(packet.iter().flat_map(|packet| xmp::find_lost_properties(packet)));
+        match packet.and_then(xmp::keep_valid_parts) {
             Ok(packet) => self.xmp = Some(packet),
-            Err(lost) => self.left_behind.push(lost),
+            Err(lost) => self.lost_properties.push(lost),
         }
     }
 
@@ -94,7 +94,7 @@ impl Extras {
             // Damaged EXIF may hide a thumbnail: drop all of it.
             if remove_thumbnail(exif).is_none() {
                 self.exif = None;
-                self.left_behind.push("EXIF that is damaged");
+                self.lost_properties.push("EXIF that is damaged");
             }
         }
         self
@@ -105,15 +105,15 @@ impl Extras {
     pub fn for_jpeg(mut self) -> Self {
         if self.exif.as_ref().is_some_and(|exif| exif.len() > MAX_JPEG_EXIF_BYTES) {
             self.exif = None;
-            self.left_behind.push("EXIF larger than a JPEG holds");
+            self.lost_properties.push("EXIF larger than a JPEG holds");
         }
         if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MAX_JPEG_ICC_BYTES) {
             self.icc_profile = None;
-            self.left_behind.push("a colour profile larger than a JPEG holds");
+            self.lost_properties.push("a colour profile larger than a JPEG holds");
         }
         if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MAX_JPEG_BYTES) {
             self.xmp = None;
-            self.left_behind.push("XMP larger than a JPEG holds");
+            self.lost_properties.push("XMP larger than a JPEG holds");
         }
         self
     }

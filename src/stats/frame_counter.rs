@@ -8,7 +8,7 @@ use crate::frame::FrameId;
 
 /// The cause of a dropped frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub enum DropCause {
     /// The source had overwritten it before it was read.
     Driver,
     /// It could not be decoded.
@@ -26,67 +26,67 @@ pub enum Cause {
 /// A frame in flight: created at capture, consumed when its fate is known.
 #[derive(Debug)]
 #[must_use = "a frame is delivered or dropped, never forgotten"]
-pub struct Ticket {
+pub struct FrameTicket {
     /// Index in the order of capture.
     pub id: FrameId,
     /// The capture time, on the run's clock.
     pub captured_ns: u64,
 }
 
-/// Counts frames from several threads. A [`Ticket`] is consumed when it is counted, so no frame counts twice.
+/// Counts frames from several threads. A [`FrameTicket`] is consumed when it is counted, so no frame counts twice.
 #[derive(Debug, Default)]
-pub struct Tally {
+pub struct FrameCounter {
     captured: AtomicU64,
     delivered: AtomicU64,
     dropped: [AtomicU64; 6],
     in_flight: AtomicU64,
 }
 
-impl Tally {
-    /// Creates a tally of zeros.
+impl FrameCounter {
+    /// Creates a counter of zeros.
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Counts a captured frame.
-    pub fn captured(&self, captured_ns: u64) -> Ticket {
+    pub fn count_captured(&self, captured_ns: u64) -> FrameTicket {
         self.in_flight.fetch_add(1, Ordering::Relaxed);
-        Ticket { id: FrameId(self.captured.fetch_add(1, Ordering::Relaxed)), captured_ns }
+        FrameTicket { id: FrameId(self.captured.fetch_add(1, Ordering::Relaxed)), captured_ns }
     }
 
     /// Counts `count` frames that were lost before they were read.
-    pub fn lost(&self, count: u64, cause: Cause) {
+    pub fn count_lost(&self, count: u64, cause: DropCause) {
         self.captured.fetch_add(count, Ordering::Relaxed);
         self.dropped[cause as usize].fetch_add(count, Ordering::Relaxed);
     }
 
     /// Counts a frame that reached the sink.
-    pub fn delivered(&self, ticket: Ticket) {
-        let Ticket { .. } = ticket;
+    pub fn count_delivered(&self, ticket: FrameTicket) {
+        let FrameTicket { .. } = ticket;
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         self.delivered.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Counts a dropped frame.
-    pub fn dropped(&self, ticket: Ticket, cause: Cause) {
-        let Ticket { .. } = ticket;
+    pub fn count_dropped(&self, ticket: FrameTicket, cause: DropCause) {
+        let FrameTicket { .. } = ticket;
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         self.dropped[cause as usize].fetch_add(1, Ordering::Relaxed);
     }
 
     /// Returns the current counts. While stages run, a frame may be missed; once they have ended, the counts are exact.
-    pub fn frames(&self) -> Frames {
-        let dropped = |cause: Cause| self.dropped[cause as usize].load(Ordering::Relaxed);
-        Frames {
+    pub fn frame_counts(&self) -> FrameCounts {
+        let dropped = |cause: DropCause| self.dropped[cause as usize].load(Ordering::Relaxed);
+        FrameCounts {
             captured: self.captured.load(Ordering::Relaxed),
             delivered: self.delivered.load(Ordering::Relaxed),
-            dropped: Dropped {
-                driver: dropped(Cause::Driver),
-                corrupt: dropped(Cause::Corrupt),
-                evicted: dropped(Cause::Evicted),
-                late: dropped(Cause::Late),
-                unpaired: dropped(Cause::Unpaired),
-                failed: dropped(Cause::Failed),
+            dropped: DropCounts {
+                driver: dropped(DropCause::Driver),
+                corrupt: dropped(DropCause::Corrupt),
+                evicted: dropped(DropCause::Evicted),
+                late: dropped(DropCause::Late),
+                unpaired: dropped(DropCause::Unpaired),
+                failed: dropped(DropCause::Failed),
             },
             in_flight: self.in_flight.load(Ordering::Relaxed),
         }
@@ -95,35 +95,35 @@ impl Tally {
 
 /// The counts of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Frames {
+pub struct FrameCounts {
     /// Frames that the source produced, read or not.
     pub captured: u64,
     /// Frames that reached the sink.
     pub delivered: u64,
     /// Frames that did not reach the sink, by cause.
-    pub dropped: Dropped,
+    pub dropped: DropCounts,
     /// Frames still in flight when the run ended; 0 unless a stage failed or the sink was closed from outside.
     pub in_flight: u64,
 }
 
-/// Dropped frames by [`Cause`].
+/// Dropped frames by [`DropCause`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Dropped {
-    /// [`Cause::Driver`]
+pub struct DropCounts {
+    /// [`DropCause::Driver`]
     pub driver: u64,
-    /// [`Cause::Corrupt`]
+    /// [`DropCause::Corrupt`]
     pub corrupt: u64,
-    /// [`Cause::Evicted`]
+    /// [`DropCause::Evicted`]
     pub evicted: u64,
-    /// [`Cause::Late`]
+    /// [`DropCause::Late`]
     pub late: u64,
-    /// [`Cause::Unpaired`]
+    /// [`DropCause::Unpaired`]
     pub unpaired: u64,
-    /// [`Cause::Failed`]
+    /// [`DropCause::Failed`]
     pub failed: u64,
 }
 
-impl Dropped {
+impl DropCounts {
     /// Returns the counts with the names of their causes, in the order of the report.
     pub fn by_cause(&self) -> [(&'static str, u64); 6] {
         [
@@ -142,9 +142,9 @@ impl Dropped {
     }
 }
 
-impl Frames {
+impl FrameCounts {
     /// Returns whether captured = delivered + dropped + in flight.
-    pub fn balance(&self) -> bool {
+    pub fn is_balanced(&self) -> bool {
         self.captured == self.delivered + self.dropped.total() + self.in_flight
     }
 }
@@ -155,29 +155,36 @@ mod tests {
 
     #[test]
     fn every_cause_has_its_own_count() {
-        let tally = Tally::new();
-        let causes = [Cause::Driver, Cause::Corrupt, Cause::Evicted, Cause::Late, Cause::Unpaired, Cause::Failed];
+        let tally = FrameCounter::new();
+        let causes = [
+            DropCause::Driver,
+            DropCause::Corrupt,
+            DropCause::Evicted,
+            DropCause::Late,
+            DropCause::Unpaired,
+            DropCause::Failed,
+        ];
         for (times, cause) in causes.into_iter().enumerate() {
-            tally.lost(times as u64, cause);
-            let ticket = tally.captured(0);
-            tally.dropped(ticket, cause);
+            tally.count_lost(times as u64, cause);
+            let ticket = tally.count_captured(0);
+            tally.count_dropped(ticket, cause);
         }
-        let frames = tally.frames();
+        let frames = tally.frame_counts();
         assert_eq!(frames.dropped.by_cause().map(|cause| cause.1), [1, 2, 3, 4, 5, 6]);
         assert_eq!((frames.captured, frames.in_flight), (21, 0));
-        assert!(frames.balance());
+        assert!(frames.is_balanced());
     }
 
     #[test]
     fn a_frame_without_a_fate_is_in_flight() {
-        let tally = Tally::new();
-        let (first, second) = (tally.captured(10), tally.captured(20));
+        let tally = FrameCounter::new();
+        let (first, second) = (tally.count_captured(10), tally.count_captured(20));
         assert_eq!((first.id, second.id, second.captured_ns), (FrameId(0), FrameId(1), 20));
-        tally.delivered(first);
+        tally.count_delivered(first);
         drop(second);
-        let frames = tally.frames();
+        let frames = tally.frame_counts();
         assert_eq!((frames.captured, frames.delivered, frames.in_flight), (2, 1, 1));
-        assert!(frames.balance());
-        assert!(!Frames { captured: 3, ..frames }.balance());
+        assert!(frames.is_balanced());
+        assert!(!FrameCounts { captured: 3, ..frames }.is_balanced());
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Counts of a PipeWire camera: each delivered picture was either shown or skipped for one of the reasons below; the
 /// last one may be in flight.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct NodeUse {
+pub struct NodeCounts {
     /// The node name, by which programs remember the camera.
     pub node: String,
     /// Pictures that readers received, repeats not included.
@@ -24,7 +24,7 @@ pub struct NodeUse {
     pub returns: u64,
 }
 
-impl fmt::Display for NodeUse {
+impl fmt::Display for NodeCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "PipeWire camera {}: {} pictures shown", self.node, self.shown)?;
         let others = [
@@ -40,7 +40,7 @@ impl fmt::Display for NodeUse {
 
 /// Counts of one of several outputs: each delivered frame was taken or lost; the last one may be in flight.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct OutputUse {
+pub struct OutputCounts {
     /// The output's kind and place.
     pub output: String,
     /// Frames taken, the still card included.
@@ -51,7 +51,7 @@ pub struct OutputUse {
     pub lost: u64,
 }
 
-impl fmt::Display for OutputUse {
+impl fmt::Display for OutputCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { output, frames, lost, .. } = self;
         write!(f, "{output}: {frames} frames")?;
