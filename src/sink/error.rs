@@ -49,7 +49,7 @@ pub enum SinkError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// Writing failed, but the frames until then are kept.
-    #[error("{error}; the frames written before it are kept in {}", kept.display())]
+    #[error("{error}; the frames written before it are kept as {}", kept.display())]
     Kept {
         error: Box<SinkError>,
         /// The file or folder.
