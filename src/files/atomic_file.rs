@@ -83,7 +83,7 @@ impl PartFile {
         sync_folder(&self.path)
     }
 
-    /// Does the same as [`PartFile::commit`] without replacing and without sync: the caller syncs the file system later.
+    /// Does the same as [`PartFile::commit`] without replacing and without sync: the caller syncs later.
     ///
     /// # Errors
     /// Same as for [`PartFile::commit`].

@@ -1,4 +1,4 @@
-//! Folders for program data, by the XDG Base Directory Specification. Empty and relative paths are ignored.
+//! A program's folders, by the XDG Base Directory Specification. Empty and relative paths are ignored.
 
 use std::env;
 use std::path::PathBuf;
@@ -7,7 +7,12 @@ use super::trusted::absolute_env_path;
 
 /// Returns the user's folder: `$XDG_DATA_HOME`, or `~/.local/share`.
 pub fn user_data_dir() -> Option<PathBuf> {
-    absolute_env_path("XDG_DATA_HOME").or_else(|| Some(absolute_env_path("HOME")?.join(".local/share")))
+    user_dir("XDG_DATA_HOME", ".local/share")
+}
+
+/// Returns the folder in an environment variable, else the folder `default` below `$HOME`.
+pub fn user_dir(variable: &str, default: &str) -> Option<PathBuf> {
+    absolute_env_path(variable).or_else(|| Some(absolute_env_path("HOME")?.join(default)))
 }
 
 /// Returns the system's folders in order of precedence: `$XDG_DATA_DIRS`, or the two standard ones.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 
+use super::data::user_dir;
 use super::input;
 use super::trusted::absolute_env_path;
 
@@ -32,7 +33,7 @@ impl Folders {
     /// names; the current folder if none exists.
     pub fn from_user_dirs() -> Self {
         let home = absolute_env_path("HOME");
-        let config = absolute_env_path("XDG_CONFIG_HOME").or_else(|| Some(home.as_ref()?.join(".config")));
+        let config = user_dir("XDG_CONFIG_HOME", ".config");
         let named =
             config.and_then(|config| input::read_text(&config.join("user-dirs.dirs"), input::MAX_SETTINGS_BYTES).ok());
         let folder = |variable: &str, usual: &str| {
@@ -54,7 +55,7 @@ impl Folders {
         [self.videos.as_path()].into_iter().chain(pictures)
     }
 
-    /// Returns a path for a new recording, which neither exists nor taken by `is_taken`.
+    /// Returns a path for a new recording: nothing exists there, and `is_taken` is false for it.
     pub fn unused_video_path(&self, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
         unused_path(&self.videos, VIDEO_SUFFIX, is_taken)
     }
@@ -65,7 +66,8 @@ impl Folders {
     }
 }
 
-/// Returns a path in the folder, named by date, with this suffix; neither a file, nor a link, nor taken by `is_taken`.
+/// Returns a path in the folder, named by date, with this suffix: neither a file nor a link is there, and `is_taken` is
+/// false for it.
 fn unused_path(folder: &Path, suffix: &str, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
     let stem = timestamped_stem();
     let path = |number: u32| match number {
@@ -113,8 +115,8 @@ pub fn parent_folder(file: &Path) -> Option<PathBuf> {
     folder.parent().map(Path::to_owned)
 }
 
-/// Opens a folder in the desktop's file manager without waiting; calls `on_error` with the reason, on another thread, if
-/// that fails.
+/// Opens a folder in the desktop's file manager without waiting. If that fails, calls `on_error` with the reason, on
+/// another thread.
 pub fn open_in_file_manager(folder: PathBuf, on_error: impl Fn(String) + Send + 'static) {
     let run = move || {
         let mut command = Command::new("xdg-open");

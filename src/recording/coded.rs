@@ -90,8 +90,8 @@ impl<'a> EncodedPicture<'a> {
         }
     }
 
-    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`EncodedPicture::decode_runs`] makes. The caller
-    /// checks that the samples are 8-bit RGB.
+    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`EncodedPicture::decode_runs`] makes. The
+    /// caller checks that the samples are 8-bit RGB.
     pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<PhotoMetadata, PictureFault> {
         match self {
             Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {

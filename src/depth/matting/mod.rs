@@ -192,8 +192,8 @@ impl Matting {
     }
 
     /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
-    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::max_pixels`] edge pixels,
-    /// only the largest steps count.
+    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::max_pixels`] edge
+    /// pixels, only the largest steps count.
     pub fn find_mixed_pixels(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
         self.find_with_background(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
     }

@@ -7,7 +7,7 @@ use pulp::WithSimd;
 
 use super::tiles::Tiles;
 
-/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels; the first is the edge pixel itself.
+/// Width of the band beside a discontinuity in which a depth may be wrong, in pixels, with the edge pixel.
 pub const BAND_PX: usize = 4;
 /// Distance that the band reaches from its edge pixel.
 const SIDE_PX: usize = BAND_PX - 1;

@@ -30,7 +30,8 @@ pub(super) fn refuse_foreign(path: &Path, set: &FileSet) -> Result<(), FolderErr
     Ok(())
 }
 
-/// Recovers from a killed run: keeps its files in [`STAGING_NAME`] as `NAME.incomplete`, and removes partly written files.
+/// Recovers from a killed run: keeps its files in [`STAGING_NAME`] as `NAME.incomplete`, and removes partly written
+/// files.
 pub(super) fn recover_interrupted(path: &Path, set: &FileSet) -> Result<(), FolderError> {
     let part = path.join(STAGING_NAME);
     if is_folder(&part) {

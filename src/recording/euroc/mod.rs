@@ -50,8 +50,8 @@ impl Camera {
                 let columns = text.map(|text| text.split(',').map(str::trim).collect::<Vec<_>>());
                 match columns.as_deref() {
                     Ok(&[time, file]) => Entry::new(position, parse_ns(time), self.picture(file)),
-                    Ok(split_columns) => {
-                        let fault = LineFault::Columns { expected: "nanoseconds,file", found: split_columns.len() };
+                    Ok(columns) => {
+                        let fault = LineFault::Columns { expected: "nanoseconds,file", found: columns.len() };
                         Entry::new(position, Err(fault.clone()), Err(fault))
                     }
                     Err(fault) => Entry::new(position, Err(fault.clone()), Err(fault.clone())),

@@ -37,8 +37,8 @@ impl Default for WriterOptions {
 ///
 /// The pictures are `rgb/000000.png` (8-bit RGB), `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The lists
 /// are finished last; until then the folder is not a recording. Files of an earlier recording stay until the new one is
-/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::finish_incomplete`] must end it; otherwise
-/// there are no lists.
+/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::finish_incomplete`] must
+/// end it; otherwise there are no lists.
 pub struct Writer {
     dir: PathBuf,
     depth_scale: f32,

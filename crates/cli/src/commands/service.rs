@@ -15,8 +15,8 @@ use crate::files::{create_parent_folder, write_atomically};
 use crate::log;
 use crate::settings::file;
 use crate::terminal::{print_to_stderr, print_to_stdout};
+use bokehcam::files::data::user_dir;
 use bokehcam::files::input;
-use bokehcam::files::trusted::absolute_env_path;
 
 /// Start the camera for calls with your session, or stop doing so
 #[derive(Args, Debug)]
@@ -155,7 +155,7 @@ fn read_stream_arguments(default: &str) -> Result<(String, String), CliError> {
 
 /// Returns the path of the user's own unit.
 fn unit_path() -> Result<PathBuf, CliError> {
-    let config = absolute_env_path("XDG_CONFIG_HOME").or_else(|| Some(absolute_env_path("HOME")?.join(".config")));
+    let config = user_dir("XDG_CONFIG_HOME", ".config");
     let no_folder = || {
         CliError::Service(
             "there is no folder for units: neither XDG_CONFIG_HOME nor HOME is an absolute \

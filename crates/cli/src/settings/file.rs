@@ -9,8 +9,8 @@ use super::paths::resolve_paths;
 use super::table::{Values, is_setting, parse_flags, suggest_setting};
 use crate::error::CliError;
 use crate::log::{escape_controls, one_line};
+use bokehcam::files::data::user_dir;
 use bokehcam::files::input;
-use bokehcam::files::trusted::absolute_env_path;
 use bokehcam::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use bokehcam::look::{Patch, presets::Preset};
@@ -209,8 +209,7 @@ pub fn state_folder() -> Option<PathBuf> {
 
 /// Returns this program's folder below that of the environment variable, else below `default` in the user's home.
 fn app_folder(variable: &str, default: &str) -> Option<PathBuf> {
-    let folder = absolute_env_path(variable).or_else(|| Some(absolute_env_path("HOME")?.join(default)))?;
-    Some(folder.join("bokehcam"))
+    Some(user_dir(variable, default)?.join("bokehcam"))
 }
 
 #[cfg(test)]
