@@ -46,7 +46,7 @@ use crate::stats::{FrameCounter, Report, RunInfo, Timings};
 /// State shared by all stages of a run.
 struct Shared {
     clock: Clock,
-    tally: FrameCounter,
+    counter: FrameCounter,
     pools: Pools,
     /// Description of the camera.
     info: SourceInfo,
@@ -75,7 +75,7 @@ impl Shared {
         let is_viewed = run.view.is_some();
         Self {
             clock: run.clock.clone(),
-            tally: FrameCounter::new(),
+            counter: FrameCounter::new(),
             pools: Pools::new(&BufferCounts { in_blur, is_viewed }, info.size, info.frame_data),
             realtime_period_ns: run.realtime_period_ns(),
             info,
@@ -98,7 +98,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let (began_ns, cpu_ns) = (run.clock.now_ns(), clock::process_cpu_ns());
     let Engine { preprocessor, blur } = run.create_engine();
     let shared = Shared::new(&run, &blur);
-    let Shared { info, tally, has_ended, .. } = &shared;
+    let Shared { info, counter, has_ended, .. } = &shared;
     let mut timings = Timings::default();
     let Timings { decode, depth: of_depth, blur: of_blur, sink: of_sink } = &mut timings;
     let (mut sink, pace, stop) = (run.sink, run.pace, run.stop);
@@ -123,7 +123,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
 
     // A source with a known number of frames was stopped before its end.
     let is_cut =
-        stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frame_counts().captured < frames);
+        stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| counter.frame_counts().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Truncated } else { Ending::Complete };
     let (outputs, nodes) = (sink.output_counters(), sink.node_counters());
     let finished = run_guarded("sink", has_ended, move || Ok(sink.finish(ending)?));
@@ -135,7 +135,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         cpu_ns: clock::process_cpu_ns() - cpu_ns,
         ..about
     };
-    let report = Report::new(tally.frame_counts(), &timings, about);
+    let report = Report::new(counter.frame_counts(), &timings, about);
     // The earlier fault is the cause.
     match ended.and(finished) {
         Ok(()) => Ok(report),

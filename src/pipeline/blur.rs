@@ -126,25 +126,25 @@ impl<'a> Stage<'a> {
 
     /// Forwards a frame unblurred, unless it is late; returns whether the output is still open.
     fn pass_through(&mut self, frame: Frame<Prepared>, to: &mut To) -> bool {
-        let Shared { clock, tally, is_viewed, .. } = self.shared;
+        let Shared { clock, counter, is_viewed, .. } = self.shared;
         let (frame, Prepared { color, depth, coc, composed, .. }) = frame.take_item(clock.now_ns());
         if self.is_late(&frame, 0) {
-            tally.count_dropped(frame.ticket, DropCause::Late);
+            counter.count_dropped(frame.ticket, DropCause::Late);
             return true;
         }
         let (picture, depth) = (Picture::from_memory(color), depth.filter(|_| *is_viewed));
-        frame.with_item(Blurred { picture, color: None, depth, coc, crop: composed.crop }).send_to(to, tally)
+        frame.with_item(Blurred { picture, color: None, depth, coc, crop: composed.crop }).send_to(to, counter)
     }
 
     /// Submits a frame to the executor, unless it is too late; returns whether it was submitted.
     fn submit(&mut self, frame: Frame<Prepared>) -> Result<bool, Fault> {
-        let Shared { clock, tally, pools, plan, wants_yuyv, .. } = self.shared;
+        let Shared { clock, counter, pools, plan, wants_yuyv, .. } = self.shared;
         let (mut frame, Prepared { color, depth, coc, composed, times, .. }) = frame.take_item(clock.now_ns());
         times.into_iter().for_each(|times| self.blur.picker.record_depth(times));
         // The frame queues behind those in flight.
         let expected_ns = self.blur.picker.expected_blur_ns() * (self.in_flight.len() as u64 + 1);
         if self.is_late(&frame, expected_ns) {
-            tally.count_dropped(frame.ticket, DropCause::Late);
+            counter.count_dropped(frame.ticket, DropCause::Late);
             self.blur.picker.record_late_frame();
             plan.set(self.blur.picker.plan());
             return Ok(false);
@@ -160,7 +160,7 @@ impl<'a> Stage<'a> {
         let job = Job { ticket, color, depth, coc, quality, place, out, yuyv, on_device };
         let submitted = self.blur.submit(job);
         if let Err(error) = submitted {
-            tally.count_dropped(frame.ticket, DropCause::Failed);
+            counter.count_dropped(frame.ticket, DropCause::Failed);
             return Err(error.into());
         }
         self.in_flight.push_back(frame.with_item(InFlight { coc, crop, original }));
@@ -170,7 +170,7 @@ impl<'a> Stage<'a> {
     /// Forwards the oldest frame if it is finished; with `wait`, waits until it is. Returns whether the output is still
     /// open.
     fn collect(&mut self, wait: bool, to: &mut To) -> Result<bool, Fault> {
-        let Shared { clock, tally, is_viewed, .. } = self.shared;
+        let Shared { clock, counter, is_viewed, .. } = self.shared;
         let finished = match self.blur.collect(wait) {
             Ok(Some(finished)) => finished,
             Ok(None) if wait => return Err(Fault::LostFrame),
@@ -179,7 +179,7 @@ impl<'a> Stage<'a> {
                 self.in_flight
                     .pop_front()
                     .into_iter()
-                    .for_each(|frame| tally.count_dropped(frame.ticket, DropCause::Failed));
+                    .for_each(|frame| counter.count_dropped(frame.ticket, DropCause::Failed));
                 return Err(error.into());
             }
         };
@@ -197,7 +197,7 @@ impl<'a> Stage<'a> {
             original.restore(&mut color, map);
         }
         let (color, depth) = (Some(color).filter(|_| *is_viewed), depth.filter(|_| *is_viewed));
-        Ok(frame.with_item(Blurred { picture, color, depth, coc, crop }).send_to(to, tally))
+        Ok(frame.with_item(Blurred { picture, color, depth, coc, crop }).send_to(to, counter))
     }
 
     /// Returns whether a frame is too late if its blur takes `expected_ns`; a frame that was sought never is.

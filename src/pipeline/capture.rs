@@ -48,7 +48,7 @@ impl<'a> Stage<'a> {
 
     /// Captures until the camera ends, a stop flag is set, or the output is closed.
     pub(super) fn run(mut self, mut to: Sender<Frame<CapturedFrame>>) -> StageResult {
-        let Shared { clock, tally, pools, info, keep_going, .. } = self.shared;
+        let Shared { clock, counter, pools, info, keep_going, .. } = self.shared;
         let frame_data = info.frame_data;
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
         // Stand-ins for a camera that brings neither; they stay empty.
@@ -72,7 +72,7 @@ impl<'a> Stage<'a> {
                 self.pacer.shift_schedule(clock.now_ns() - pause_began_ns);
                 continue;
             }
-            tally.count_lost(self.pacer.skip_late_frames(&mut *self.camera), DropCause::Driver);
+            counter.count_lost(self.pacer.skip_late_frames(&mut *self.camera), DropCause::Driver);
             let mut color = pools.colors.take();
             let mut depth = (frame_data == FrameData::Depth).then(|| pools.depths.take());
             let mut right = (frame_data == FrameData::RightCamera).then(|| pools.rights.take());
@@ -92,7 +92,7 @@ impl<'a> Stage<'a> {
                         Some(captured_ns) => captured_ns,
                         None => self.pacer.wait_until_due(stamp.time_ns, read_ns, || stopped() || has_request()),
                     };
-                    let ticket = tally.count_captured(captured_ns);
+                    let ticket = counter.count_captured(captured_ns);
                     let since_ns = clock.now_ns();
                     // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
                     let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
@@ -108,12 +108,12 @@ impl<'a> Stage<'a> {
                         since_ns,
                         item: CapturedFrame { color, depth, right, ahead_ns },
                     };
-                    if !frame.send_to(&mut to, tally) {
+                    if !frame.send_to(&mut to, counter) {
                         break;
                     }
                 }
                 Captured::Corrupt(error) => {
-                    tally.count_lost(1, DropCause::Corrupt);
+                    counter.count_lost(1, DropCause::Corrupt);
                     if !keep_going {
                         return Err(error.into());
                     }
@@ -122,7 +122,7 @@ impl<'a> Stage<'a> {
                         has_warned = true;
                     }
                 }
-                Captured::Lost(count, cause) => tally.count_lost(count, cause),
+                Captured::Lost(count, cause) => counter.count_lost(count, cause),
                 Captured::Waiting => {}
                 Captured::End => break,
             }

@@ -46,7 +46,7 @@ impl<'a> Stage<'a> {
 
     /// Delivers frames until they end, the sink is closed, or the viewer is gone.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> StageResult {
-        let Shared { clock, tally, .. } = self.shared;
+        let Shared { clock, counter, .. } = self.shared;
         let mut last_ns = None;
         // Ticket of the frame sent to the viewer last, if its delivery depends on the viewer.
         let mut at_viewer = None;
@@ -80,7 +80,7 @@ impl<'a> Stage<'a> {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
-                    tally.count_dropped(frame.ticket, DropCause::Failed);
+                    counter.count_dropped(frame.ticket, DropCause::Failed);
                     return Err(error.into());
                 }
             };
@@ -96,10 +96,10 @@ impl<'a> Stage<'a> {
             let kept = was_given && self.sink.has_outputs();
             let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
-            done.into_iter().for_each(|ticket| tally.count_delivered(ticket));
+            done.into_iter().for_each(|ticket| counter.count_delivered(ticket));
             if let Some(view) = &mut self.view {
                 let Blurred { picture, color, depth, coc, crop } = blurred;
-                let frames = tally.frame_counts();
+                let frames = counter.frame_counts();
                 let view_of = View {
                     picture,
                     color,
@@ -131,8 +131,8 @@ impl<'a> Stage<'a> {
 
     /// Reports the progress of the run; `quality` is that of the last frame.
     fn report_progress(&self, quality: Option<Quality>) {
-        let Shared { tally, info, .. } = self.shared;
-        let frames = tally.frame_counts();
+        let Shared { counter, info, .. } = self.shared;
+        let frames = counter.frame_counts();
         (self.progress)(Progress {
             captured: frames.captured,
             delivered: frames.delivered,
@@ -177,8 +177,8 @@ impl<'a> Stage<'a> {
     /// Counts a frame whose delivery depended on the viewer: delivered if it was taken, otherwise evicted.
     fn count_viewed(&self, taken: bool, ticket: Option<FrameTicket>) {
         match ticket {
-            Some(ticket) if taken => self.shared.tally.count_delivered(ticket),
-            Some(ticket) => self.shared.tally.count_dropped(ticket, DropCause::Evicted),
+            Some(ticket) if taken => self.shared.counter.count_delivered(ticket),
+            Some(ticket) => self.shared.counter.count_dropped(ticket, DropCause::Evicted),
             None => {}
         }
     }

@@ -70,7 +70,7 @@ impl<'a> Stage<'a> {
         mut from: Receiver<Frame<CapturedFrame>>,
         mut to: Sender<Frame<Prepared>>,
     ) -> StageResult {
-        let Shared { clock, tally, .. } = self.shared;
+        let Shared { clock, counter, .. } = self.shared;
         let mut has_warned = false;
         loop {
             let frame = match from.recv_timeout(IDLE) {
@@ -96,7 +96,7 @@ impl<'a> Stage<'a> {
                         Fault::Depth(_) => (DropCause::Corrupt, self.shared.keep_going),
                         _ => (DropCause::Failed, false),
                     };
-                    tally.count_dropped(frame.ticket, cause);
+                    counter.count_dropped(frame.ticket, cause);
                     if !goes_on {
                         return Err(fault);
                     }
@@ -110,7 +110,7 @@ impl<'a> Stage<'a> {
             self.times.matted_by = self.preprocessor.matting_backend().or(self.times.matted_by);
             (frame.change, frame.is_transitional) = self.change;
             frame.trace.is_depth_reused = self.times.reused > reused_before;
-            if !self.compose_frame(frame, color, depth, coc).send_to(&mut to, tally) {
+            if !self.compose_frame(frame, color, depth, coc).send_to(&mut to, counter) {
                 return Ok(());
             }
         }

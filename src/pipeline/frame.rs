@@ -36,11 +36,11 @@ impl<T> Frame<T> {
 
     /// Sends it to the next stage, and counts an older frame that it displaced; returns whether the output is still
     /// open.
-    pub fn send_to(self, to: &mut Sender<Self>, tally: &FrameCounter) -> bool {
+    pub fn send_to(self, to: &mut Sender<Self>, counter: &FrameCounter) -> bool {
         match to.send(self) {
             Ok(None) => true,
             Ok(Some(older)) => {
-                tally.count_dropped(older.ticket, DropCause::Evicted);
+                counter.count_dropped(older.ticket, DropCause::Evicted);
                 true
             }
             // The frame's fate is unknown: it stays in flight.

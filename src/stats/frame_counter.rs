@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn every_cause_has_its_own_count() {
-        let tally = FrameCounter::new();
+        let counter = FrameCounter::new();
         let causes = [
             DropCause::Driver,
             DropCause::Corrupt,
@@ -165,11 +165,11 @@ mod tests {
             DropCause::Failed,
         ];
         for (times, cause) in causes.into_iter().enumerate() {
-            tally.count_lost(times as u64, cause);
-            let ticket = tally.count_captured(0);
-            tally.count_dropped(ticket, cause);
+            counter.count_lost(times as u64, cause);
+            let ticket = counter.count_captured(0);
+            counter.count_dropped(ticket, cause);
         }
-        let frames = tally.frame_counts();
+        let frames = counter.frame_counts();
         assert_eq!(frames.dropped.by_cause().map(|cause| cause.1), [1, 2, 3, 4, 5, 6]);
         assert_eq!((frames.captured, frames.in_flight), (21, 0));
         assert!(frames.is_balanced());
@@ -177,12 +177,12 @@ mod tests {
 
     #[test]
     fn a_frame_without_a_fate_is_in_flight() {
-        let tally = FrameCounter::new();
-        let (first, second) = (tally.count_captured(10), tally.count_captured(20));
+        let counter = FrameCounter::new();
+        let (first, second) = (counter.count_captured(10), counter.count_captured(20));
         assert_eq!((first.id, second.id, second.captured_ns), (FrameId(0), FrameId(1), 20));
-        tally.count_delivered(first);
+        counter.count_delivered(first);
         drop(second);
-        let frames = tally.frame_counts();
+        let frames = counter.frame_counts();
         assert_eq!((frames.captured, frames.delivered, frames.in_flight), (2, 1, 1));
         assert!(frames.is_balanced());
         assert!(!FrameCounts { captured: 3, ..frames }.is_balanced());

@@ -283,23 +283,23 @@ mod tests {
     use crate::stats::{DropCause, FrameCounter};
 
     fn report() -> Report {
-        let tally = FrameCounter::new();
+        let counter = FrameCounter::new();
         let mut timings = Timings::default();
         for frame in 0..10u64 {
-            let ticket = tally.count_captured(frame);
+            let ticket = counter.count_captured(frame);
             timings.decode.add(2_000_000);
             timings.blur.took.add(12_000_000);
             timings.blur.passes.add("rows", 7_000_000);
             timings.sink.latency.add(30_000_000 + frame);
-            tally.count_delivered(ticket);
+            counter.count_delivered(ticket);
         }
         for level in ["fast", "balanced", "balanced", "balanced"] {
             timings.blur.quality_counts.add(level);
         }
-        tally.count_lost(3, DropCause::Late);
+        counter.count_lost(3, DropCause::Late);
         let info =
             RunInfo { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..RunInfo::default() };
-        Report::new(tally.frame_counts(), &timings, info)
+        Report::new(counter.frame_counts(), &timings, info)
     }
 
     #[test]
