@@ -220,18 +220,15 @@ impl Shared {
         }
     }
 
-    /// Runs parts of a pass until none is left; records a panic instead of propagating it.
+    /// Runs parts of a pass until none is left; records a panic instead of propagating it. The parts after one that
+    /// panicked are run, too: the other workers may be asleep.
     fn run_parts(&self, worker: usize, pass: Pass) {
-        let work = AssertUnwindSafe(|| {
-            loop {
-                let part = self.next.fetch_add(1, Ordering::Relaxed);
-                if part >= pass.parts {
-                    break;
-                }
-                (pass.work)(worker, part);
+        loop {
+            let part = self.next.fetch_add(1, Ordering::Relaxed);
+            if part >= pass.parts {
+                break;
             }
-        });
-        if let Err(thrown) = catch_unwind(work) {
+            let Err(thrown) = catch_unwind(AssertUnwindSafe(|| (pass.work)(worker, part))) else { continue };
             // Dropping the payload may panic: a worker would then never leave, or `run_workers` would return with
             // workers at work.
             if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {

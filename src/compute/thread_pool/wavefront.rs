@@ -146,7 +146,7 @@ mod tests {
             });
         });
         assert!(std::panic::catch_unwind(pass).is_err());
-        // The thread that panicked runs no more parts; the others finish the rest.
+        // The other parts are run all the same, whichever threads are awake.
         wavefront.reset(|block| assert_eq!(*block, 5));
     }
 }
