@@ -83,7 +83,7 @@ impl CocHistogram {
         let side = &self.sides[usize::from(near)];
         let bins = (level.bins_per_side as usize).min(MAX_RANGES);
         let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
-        // A nose is no layer of its own: slightly defocused pixels in front belong to the subject.
+        // Slightly defocused pixels in front belong to the subject, not to a layer of their own.
         let first = if near { near_from_px.log2() * BUCKETS_PER_OCTAVE as f32 } else { 0.0 } as usize;
         if last < first {
             return bucket_edge_px(last + 1);

@@ -104,13 +104,13 @@ pub fn load_translation(language: Option<&str>) -> Result<Option<Table>, String>
     if ["en", "C", "POSIX"].contains(&name) {
         return Ok(None);
     }
-    let is_file = name.ends_with(".toml").then(|| PathBuf::from(name));
+    let file = name.ends_with(".toml").then(|| PathBuf::from(name));
     let none = || {
         format!(
             "there is no translation '{name}': save one as ~/.local/share/bokehcam/texts/{name}.toml, or give a file"
         )
     };
-    match is_file.or_else(|| find_translation(name)) {
+    match file.or_else(|| find_translation(name)) {
         Some(path) => read_translation(&path).map(Some),
         None => load_built_in(name).ok_or_else(none).map(Some),
     }

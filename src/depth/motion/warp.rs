@@ -116,15 +116,15 @@ impl Warp<'_> {
     }
 }
 
-/// Copies the depth of a cell's surface, selected by `is_taken`, to its new place, if it is nearer than the depth
-/// there. At the picture's border, the edge pixels are replicated.
+/// Copies the depth of a cell's surface, selected by `belongs_to_surface`, to its new place, if it is nearer than the
+/// depth there. At the picture's border, the edge pixels are replicated.
 #[inline(always)]
 fn move_surface(
     from: &DepthMap,
     to: &mut DepthMap,
     [xs, ys]: [Range<usize>; 2],
     [right, down]: Vector,
-    is_taken: impl Fn(f32) -> bool,
+    belongs_to_surface: impl Fn(f32) -> bool,
 ) {
     let (width, height) = (from.width as usize, from.height as usize);
     let target_range = |px: &Range<usize>, by: i32, count: usize| {
@@ -135,20 +135,23 @@ fn move_surface(
     let (columns, rows) = (target_range(&xs, right, width), target_range(&ys, down, height));
     // Between the replicated columns, it is a plain copy.
     let inner = |px: usize| ((px as i32 + right).max(0) as usize).clamp(columns.start, columns.end);
-    let (begins, ends) = (inner(xs.start), inner(xs.end));
+    let (copy_begins, copy_ends) = (inner(xs.start), inner(xs.end));
     for y in rows {
         let line = (y as i32 - down).clamp(ys.start as i32, ys.end as i32 - 1) as usize;
         let source = &from.metres[line * width..][..width];
         let target = &mut to.metres[y * width..][..width];
-        let put = |target: &mut f32, metres: f32| {
-            let is_over = is_taken(metres) & (metres < *target);
-            *target = if is_over { metres } else { *target };
+        let write_if_nearer = |target: &mut f32, metres: f32| {
+            let is_nearer = belongs_to_surface(metres) & (metres < *target);
+            *target = if is_nearer { metres } else { *target };
         };
-        target[columns.start..begins].iter_mut().for_each(|target| put(target, source[xs.start]));
-        if begins < ends {
-            let moved = &source[(begins as i32 - right) as usize..];
-            target[begins..ends].iter_mut().zip(moved).for_each(|(target, &metres)| put(target, metres));
+        target[columns.start..copy_begins].iter_mut().for_each(|target| write_if_nearer(target, source[xs.start]));
+        if copy_begins < copy_ends {
+            let moved = &source[(copy_begins as i32 - right) as usize..];
+            target[copy_begins..copy_ends]
+                .iter_mut()
+                .zip(moved)
+                .for_each(|(target, &metres)| write_if_nearer(target, metres));
         }
-        target[ends..columns.end].iter_mut().for_each(|target| put(target, source[xs.end - 1]));
+        target[copy_ends..columns.end].iter_mut().for_each(|target| write_if_nearer(target, source[xs.end - 1]));
     }
 }

@@ -75,7 +75,7 @@ impl SubjectMask {
                 // Including their soft outlines.
                 let component = std::mem::take(&mut self.queue);
                 for &at in &component {
-                    self.clear_around(at as usize);
+                    self.clear_neighbourhood(at as usize);
                 }
                 self.queue = component;
             }
@@ -107,16 +107,17 @@ impl SubjectMask {
         }
     }
 
-    fn clear_around(&mut self, at: usize) {
+    /// Removes the other person's soft outline around the pixel at `index`.
+    fn clear_neighbourhood(&mut self, index: usize) {
         const RADIUS: usize = 3;
         let (width, height) = (self.mask.width as usize, self.mask.height as usize);
-        let (x, y) = (at % width, at / width);
+        let (x, y) = (index % width, index / width);
         for y in y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height) {
             for x in x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width) {
-                // Keeps the pixels of a subject beside them.
-                let at = y * width + x;
-                if self.others[at] || self.nearness[at] < MIN_SUBJECT_NEARNESS {
-                    self.mask.alpha[at] = 0.0;
+                // A near pixel of nobody else is the subject's.
+                let neighbour = y * width + x;
+                if self.others[neighbour] || self.nearness[neighbour] < MIN_SUBJECT_NEARNESS {
+                    self.mask.alpha[neighbour] = 0.0;
                 }
             }
         }

@@ -207,7 +207,7 @@ impl StreamCommand {
         }
         let is_found = look.effect.follows_depth() && look.focus == FocusRule::Auto;
         if let Some(persons) = source.persons.as_ref().filter(|_| is_found) {
-            print_line(&format!("focus on persons by {persons}"));
+            print_line(&format!("focus on people found by {persons}"));
         }
         let takes_any_depth = self.parts.blur.accepts_any_depth();
         // The source's note on its depth map is irrelevant if no depth is wanted.

@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `scenes`, `texture` | scenes made by code |
+//! | `scenes`, `builder`, `texture` | scenes made by code |
 //! | `lens`, `truth` | the exact renderer, and its pictures kept between runs |
 //! | `damage` | depth maps as sensors give them |
 //! | `methods`, `rivals`, `masks`, `situations` | what is compared |
@@ -11,6 +11,7 @@
 //!
 //! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` tests the bench itself.
 
+mod builder;
 #[path = "../common/mod.rs"]
 mod common;
 mod damage;

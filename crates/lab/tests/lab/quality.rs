@@ -1,6 +1,8 @@
 //! Laws of the quality bench: its metrics, its renderer, its rivals and its damage.
 #![allow(dead_code, missing_docs)]
 
+#[path = "../../benches/quality/builder.rs"]
+mod builder;
 #[path = "../../benches/quality/damage.rs"]
 mod damage;
 #[path = "../../benches/quality/flip.rs"]

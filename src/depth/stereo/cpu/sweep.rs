@@ -178,29 +178,30 @@ struct LeftSweep<'a, const N: usize> {
 }
 
 impl<const N: usize> LeftSweep<'_, N> {
-    /// Advances row 0 to column `k`, row 1 to the one before, and so on.
+    /// Advances the wavefront: row 0 to `column`, row 1 to the column before, and so on. `down` holds the paths from
+    /// the group above, and `paths_between_rows[r]` the path that enters row `r` from above.
     #[inline(always)]
     fn advance(
         &mut self,
-        k: usize,
+        column: usize,
         down: &mut DownPaths,
-        between: &mut [PathValues; GROUP + 1],
-        before: &[PathValues; GROUP],
-        now: &mut [PathValues; GROUP],
+        paths_between_rows: &mut [PathValues; GROUP + 1],
+        previous: &[PathValues; GROUP],
+        current: &mut [PathValues; GROUP],
     ) {
         let states = &mut down.values.as_chunks_mut::<N>().0[..self.columns];
-        let past = k.wrapping_sub(GROUP);
+        let past = column.wrapping_sub(GROUP);
         if past < self.columns {
-            states[past] = *between[GROUP].as_array::<N>();
-            down.least[past] = between[GROUP].least;
+            states[past] = *paths_between_rows[GROUP].as_array::<N>();
+            down.least[past] = paths_between_rows[GROUP].least;
         }
-        self.advance_row::<3>(k, between, before, now);
-        self.advance_row::<2>(k, between, before, now);
-        self.advance_row::<1>(k, between, before, now);
-        self.advance_row::<0>(k, between, before, now);
+        self.advance_row::<3>(column, paths_between_rows, previous, current);
+        self.advance_row::<2>(column, paths_between_rows, previous, current);
+        self.advance_row::<1>(column, paths_between_rows, previous, current);
+        self.advance_row::<0>(column, paths_between_rows, previous, current);
         // Loaded one step ahead of its use.
-        if k + 1 < self.columns {
-            between[0].set(&states[k + 1], down.least[k + 1]);
+        if column + 1 < self.columns {
+            paths_between_rows[0].set(&states[column + 1], down.least[column + 1]);
         }
     }
 
@@ -208,20 +209,20 @@ impl<const N: usize> LeftSweep<'_, N> {
     #[inline(always)]
     fn advance_row<const ROW: usize>(
         &mut self,
-        k: usize,
-        between: &mut [PathValues; GROUP + 1],
-        before: &[PathValues; GROUP],
-        now: &mut [PathValues; GROUP],
+        column: usize,
+        paths_between_rows: &mut [PathValues; GROUP + 1],
+        previous: &[PathValues; GROUP],
+        current: &mut [PathValues; GROUP],
     ) {
-        let x = k.wrapping_sub(ROW);
+        let x = column.wrapping_sub(ROW);
         if x >= self.columns {
             return;
         }
         let mut sums = CacheAligned([0; N]);
         let p2 = self.p2.map(|p2| p2[x][ROW]);
         let cell = CacheAligned(self.cells[x][ROW]);
-        let (above, below) = between.split_at_mut(ROW + 1);
-        advance_two_paths(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
+        let (above, below) = paths_between_rows.split_at_mut(ROW + 1);
+        advance_two_paths(&previous[ROW], &above[ROW], p2, &cell.0, &mut current[ROW], &mut below[0], &mut sums.0);
         self.rows[ROW].update(x, &sums.0);
     }
 }
@@ -229,16 +230,16 @@ impl<const N: usize> LeftSweep<'_, N> {
 /// Computes a step of the path along a row and of the one down a column, and the sums of all three paths.
 #[inline(always)]
 fn advance_two_paths<const N: usize>(
-    before: &PathValues,
+    previous: &PathValues,
     above: &PathValues,
     p2: [u8; 2],
     [costs, halves]: &[[u8; N]; 2],
-    now: &mut PathValues,
+    current: &mut PathValues,
     below: &mut PathValues,
     sums: &mut [u8; N],
 ) {
-    let (along, down) = (before.step_to::<N>(p2[0]), above.step_to::<N>(p2[1]));
-    let (along_values, down_values) = (now.as_array_mut::<N>(), below.as_array_mut::<N>());
+    let (along, down) = (previous.step_to::<N>(p2[0]), above.step_to::<N>(p2[1]));
+    let (along_values, down_values) = (current.as_array_mut::<N>(), below.as_array_mut::<N>());
     let (mut along_least, mut down_least) = (u8::MAX, u8::MAX);
     for d in 0..N {
         let (along, down) = (along.value(d, costs[d]), down.value(d, costs[d]));
@@ -246,7 +247,7 @@ fn advance_two_paths<const N: usize>(
         sums[d] = halves[d] + (along >> 1) + (down >> 1);
         (along_least, down_least) = (along_least.min(along), down_least.min(down));
     }
-    (now.least, below.least) = (along_least, down_least);
+    (current.least, below.least) = (along_least, down_least);
 }
 
 /// Writes the disparities that pass the left-right consistency check to `out`.

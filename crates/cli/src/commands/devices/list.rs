@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::shared::{self, SharedCamera};
+use super::pipewire::{self, PipewireCamera};
 use super::{CliError, DevicesCommand};
 use crate::options::Global;
 use crate::terminal;
@@ -33,7 +33,7 @@ struct List {
     virtual_cameras: Vec<DeviceInfo>,
     /// PipeWire's cameras; these may include V4L2 cameras listed above.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pipewire: Vec<SharedCamera>,
+    pipewire: Vec<PipewireCamera>,
     /// Other nodes, listed only if named on the command line.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     others: Vec<DeviceInfo>,
@@ -46,10 +46,10 @@ struct List {
 pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     let list = match &command.device {
         None => {
-            List { pipewire: shared::list_cameras(), ..List::from_nodes(node::list_nodes(), false, command.controls) }
+            List { pipewire: pipewire::list_cameras(), ..List::from_nodes(node::list_nodes(), false, command.controls) }
         }
         Some(name) => match name.strip_prefix("pipewire:") {
-            Some(name) => List { pipewire: shared::find_cameras(name)?, ..List::default() },
+            Some(name) => List { pipewire: pipewire::find_cameras(name)?, ..List::default() },
             None => List::from_nodes(find_nodes(name)?, true, command.controls),
         },
     };
@@ -69,7 +69,7 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
 /// See [`super::format_devices`].
 pub fn format_devices(nodes: &[Node]) -> String {
     let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
-    let list = List { pipewire: shared::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
+    let list = List { pipewire: pipewire::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
     let listed = list.to_string();
     if listed.is_empty() { "none".to_owned() } else { listed }
 }

@@ -3,7 +3,7 @@
 #[cfg(feature = "camera")]
 mod list;
 #[cfg(feature = "camera")]
-mod shared;
+mod pipewire;
 
 use clap::Args;
 

@@ -8,6 +8,7 @@ mod materials;
 mod outside;
 mod room;
 mod sdf;
+mod seats;
 mod situation;
 mod torso;
 

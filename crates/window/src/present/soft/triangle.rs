@@ -50,7 +50,7 @@ pub fn rasterize(
         let columns = coverage.covered_columns(y, clip);
         if !columns.is_empty() {
             let x = columns.start;
-            on_row(y, columns, &|pixels| paint.fill_row(x, y, pixels, texture));
+            on_row(y, columns, &|pixels| paint.blend_span(x, y, pixels, texture));
         }
     }
 }
@@ -193,7 +193,7 @@ impl TrianglePaint {
 
     /// Blends the triangle over `pixels`, which begin at column `x` of row `y`. The first two cases are fast paths for
     /// the most frequent triangles.
-    fn fill_row(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
+    fn blend_span(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
         match (self.flat_color, self.texel) {
             (Some(color), Some(texel)) => {
                 let color = modulate(texel, color);

@@ -9,7 +9,7 @@ use bokehcam::v4l2::modes::FormatModes;
 
 /// A PipeWire camera.
 #[derive(Serialize)]
-pub struct SharedCamera {
+pub struct PipewireCamera {
     /// Source name on the command line, `pipewire:NAME`.
     pub name: String,
     /// Human-readable name.
@@ -19,7 +19,7 @@ pub struct SharedCamera {
 
 /// Lists all cameras of PipeWire; empty if PipeWire is not running.
 #[cfg(feature = "pipewire")]
-pub fn list_cameras() -> Vec<SharedCamera> {
+pub fn list_cameras() -> Vec<PipewireCamera> {
     use bokehcam::capture::pipewire::format_modes;
     use bokehcam::pipewire::graph::Graph;
     let graph = Graph::list_with_modes().unwrap_or_else(|error| {
@@ -27,7 +27,7 @@ pub fn list_cameras() -> Vec<SharedCamera> {
         Graph::default()
     });
     let cameras = graph.sources.into_iter().filter(|source| source.is_camera);
-    let camera = cameras.map(|source| SharedCamera {
+    let camera = cameras.map(|source| PipewireCamera {
         name: format!("pipewire:{}", source.name),
         label: source.label,
         formats: source.modes.iter().map(format_modes).collect(),
@@ -37,7 +37,7 @@ pub fn list_cameras() -> Vec<SharedCamera> {
 
 /// Returns an empty list: this program was built without PipeWire.
 #[cfg(not(feature = "pipewire"))]
-pub fn list_cameras() -> Vec<SharedCamera> {
+pub fn list_cameras() -> Vec<PipewireCamera> {
     Vec::new()
 }
 
@@ -45,19 +45,19 @@ pub fn list_cameras() -> Vec<SharedCamera> {
 ///
 /// # Errors
 /// [`CliError::NoPipeWireCamera`] if none matches.
-pub fn find_cameras(name: &str) -> Result<Vec<SharedCamera>, CliError> {
+pub fn find_cameras(name: &str) -> Result<Vec<PipewireCamera>, CliError> {
     let wanted = name.to_lowercase();
-    let is_match = |camera: &SharedCamera| {
+    let is_match = |camera: &PipewireCamera| {
         [&camera.name["pipewire:".len()..], &camera.label].into_iter().any(|text| text.to_lowercase().contains(&wanted))
     };
-    let found: Vec<SharedCamera> = list_cameras().into_iter().filter(is_match).collect();
+    let found: Vec<PipewireCamera> = list_cameras().into_iter().filter(is_match).collect();
     match found.is_empty() {
         true => Err(CliError::NoPipeWireCamera(name.to_owned())),
         false => Ok(found),
     }
 }
 
-impl SharedCamera {
+impl PipewireCamera {
     /// Formats the camera as a line of names, then indented its formats.
     pub fn lines(&self) -> String {
         let mut out = format!("  {}  {}\n", self.name, self.label);
