@@ -181,7 +181,8 @@ mod tests {
             self.step()?;
             let Some(Job { ticket, color, depth, mut out, .. }) = self.jobs.pop_front() else { return Ok(None) };
             out.rgb.fill(self.mark);
-            Ok(Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times: PassTimes::new() }))
+            let picture = Picture::from_memory(out);
+            Ok(Some(BlurredFrame { ticket, picture, color, depth, times: PassTimes::new(), reused: 0.0 }))
         }
 
         fn reclaim_job(&mut self) -> Option<Job> {

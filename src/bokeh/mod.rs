@@ -26,6 +26,8 @@ mod picture;
 pub mod plan;
 #[doc(hidden)]
 pub mod quality_level;
+#[doc(hidden)]
+pub mod reuse;
 pub mod slices;
 #[doc(hidden)]
 pub mod split;
@@ -104,6 +106,9 @@ pub struct Settings {
     /// True if each frame may choose its own quality level ([`Job::quality`]): the executor then allocates for all
     /// levels.
     pub adaptive: bool,
+    /// Whether parts of a result that hardly change may be kept from earlier frames. The frames must then be those of
+    /// one stream, in order.
+    pub reuse: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
     /// Largest CoC radius in front of the focal plane, in pixels; 0 if nothing can be there.
@@ -155,6 +160,8 @@ pub struct BlurredFrame {
     pub depth: Option<Pooled<DepthMap>>,
     /// Time per pass.
     pub times: PassTimes,
+    /// Fraction of the picture that was kept from earlier frames ([`Settings::reuse`]), 0 to 1.
+    pub reused: f32,
 }
 
 /// Selects an intermediate result of the last frame, read as vectors of four values.

@@ -18,6 +18,7 @@ use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
 use super::quality_level::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
+use super::reuse::is_kept;
 use super::split::{CocHistogram, CocRange, MAX_RANGES};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -59,6 +60,8 @@ pub struct Bin {
     pub height: usize,
     /// Largest radius of its content, in bin pixels, compensated for the scale ([`compensated_radius_px`]).
     pub max_radius_px: f32,
+    /// Smallest radius of its content, in pixels of the picture, ignoring strays.
+    pub min_radius_px: f32,
     /// Whether it is in front of the focal plane.
     pub near: bool,
     /// Index of the executor's buffers it uses; the same from frame to frame.
@@ -94,6 +97,10 @@ pub struct Plan {
     pub expansion: f32,
     /// True if the rank is full and the method is the paper's: an exact 2-D gather.
     pub exact: bool,
+    /// Whether results are kept from frame to frame ([`Settings::reuse`]); bins then stay the same while they fit.
+    pub reuse: bool,
+    /// Changes whenever the bins behind the focal plane do.
+    pub generation: u64,
     coc: CocKind,
     /// Whether bins stay at full scale up to a radius of [`MAX_FULL_RADIUS_PX`].
     full_scale: bool,
@@ -104,6 +111,8 @@ pub struct Plan {
     histogram: CocHistogram,
     /// Pieces behind and in front of the focal plane, each outwards.
     ranges: [Vec<CocRange>; 2],
+    /// The best pieces of the current frame.
+    new_ranges: [Vec<CocRange>; 2],
 }
 
 impl Plan {
@@ -129,6 +138,8 @@ impl Plan {
             bank_index: level.bank,
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
+            reuse: settings.reuse,
+            generation: 0,
             ladder,
             coc: settings.coc,
             full_scale: settings.rank == Some(Rank::Full),
@@ -136,6 +147,7 @@ impl Plan {
             max_px: [settings.far_max_px, settings.near_max_px],
             histogram: CocHistogram::default(),
             ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
+            new_ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
         };
         plan.reset_bins();
         plan
@@ -156,6 +168,7 @@ impl Plan {
     /// Resets the bins to those known without a frame: of a uniform radius or a ramp. With depth there is one bin until
     /// [`Plan::split_by_depth`] has seen a frame.
     fn reset_bins(&mut self) {
+        self.generation += 1;
         let [far_px, near_px] = self.max_px;
         let [far, near] = &mut self.ranges;
         far.clear();
@@ -199,9 +212,17 @@ impl Plan {
 
     fn plan_layers(&mut self) {
         let near_from_px = self.near_from_px();
-        let sides = [false, true].into_iter().zip(&mut self.ranges);
-        let inner_px = sides.map(|(near, ranges)| self.histogram.split_side(near, &self.level, near_from_px, ranges));
-        self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
+        let sides = [false, true].map(|near| {
+            self.histogram.split_side(near, &self.level, near_from_px, &mut self.new_ranges[usize::from(near)])
+        });
+        let [far, near] = &mut self.ranges;
+        let [new_far, new_near] = &mut self.new_ranges;
+        std::mem::swap(near, new_near);
+        if far != new_far && !(self.reuse && self.histogram.still_fits(false, far, new_far)) {
+            std::mem::swap(far, new_far);
+            self.generation += 1;
+        }
+        self.focus_px = sides[0].max(sides[1]).min(self.max_px[0].max(self.max_px[1]));
         self.create_bins();
     }
 
@@ -227,6 +248,7 @@ impl Plan {
                 width: self.width.div_ceil(scale),
                 height: self.height.div_ceil(scale),
                 max_radius_px: compensated_radius_px(content.1, scale).min(self.bank.max_radius_px()),
+                min_radius_px: content.0,
                 near: high_px < 0.0,
                 slot,
             }
@@ -245,6 +267,11 @@ impl Plan {
             let low_px = if range.border_px > 0.0 { range.border_px } else { f32::NEG_INFINITY };
             self.bins.push(bin((low_px, outer_px(far, k)), content, 1 + k));
         }
+    }
+
+    /// Returns which bins' results may be kept from frame to frame.
+    pub fn kept_bins(&self) -> [bool; MAX_BINS] {
+        std::array::from_fn(|k| self.bins.get(k).is_some_and(is_kept))
     }
 
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a

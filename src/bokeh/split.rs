@@ -21,6 +21,10 @@ const BIN_COST: f64 = 0.002;
 /// Fraction of a bin's pixels that may have a smaller radius than its scale is made for.
 const STRAY_FRACTION: f32 = 0.02;
 
+/// Kept ranges serve content up to this factor beyond their largest radius, and from this factor of their smallest on.
+const HIGH_TOLERANCE: f32 = 1.1;
+const LOW_TOLERANCE: f32 = 0.8;
+
 /// A range of `|c|` on one side of the focal plane that contains pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CocRange {
@@ -88,18 +92,8 @@ impl CocHistogram {
         if last < first {
             return bucket_edge_px(last + 1);
         }
-        // Prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture. A
-        // constant factor on |c| (1.04: within the bucket) changes no variance.
-        let mut sums = [[0.0f64; 3]; BUCKETS + 1];
-        for (k, &n) in side.iter().enumerate() {
-            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(bucket_edge_px(k)) * 1.04).ln());
-            sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
-        }
-        // Variance of ln |c| over some buckets, times their fraction of the picture.
-        let variance = |from: usize, to: usize| {
-            let [fraction, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
-            if fraction > 0.0 { (squares - sum * sum / fraction).max(0.0) } else { 0.0 }
-        };
+        let sums = self.sum_buckets(near);
+        let variance = |from: usize, to: usize| variance_between(&sums, from, to);
         // best[j][to]: smallest cost of buckets first..to in j + 1 ranges, and the start of the last range.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_RANGES];
         for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
@@ -130,6 +124,38 @@ impl CocHistogram {
         ranges.first().map_or(FOCUS_BORDER_PX, |range| range.border_px)
     }
 
+    /// Returns prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture.
+    fn sum_buckets(&self, near: bool) -> [[f64; 3]; BUCKETS + 1] {
+        let mut sums = [[0.0f64; 3]; BUCKETS + 1];
+        for (k, &n) in self.sides[usize::from(near)].iter().enumerate() {
+            // A constant factor on |c| (1.04: within the bucket) changes no variance.
+            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(bucket_edge_px(k)) * 1.04).ln());
+            sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
+        }
+        sums
+    }
+
+    /// Whether the ranges of an earlier frame, outwards, still serve: they cost hardly more than the `best` of this
+    /// frame, and no content lies outside the radii that their filters and scales are made for.
+    pub fn still_fits(&self, near: bool, ranges: &[CocRange], best: &[CocRange]) -> bool {
+        let (Some(last), Some(best_last)) = (ranges.last(), best.last()) else { return ranges.len() == best.len() };
+        if best_last.high_px > last.high_px * HIGH_TOLERANCE {
+            return false;
+        }
+        let (side, sums) = (&self.sides[usize::from(near)], self.sum_buckets(near));
+        let cost = |ranges: &[CocRange]| {
+            let borders = ranges.iter().map(|range| bucket_of(range.border_px));
+            let ends = borders.clone().skip(1).chain([BUCKETS]);
+            borders.zip(ends).map(|(from, to)| variance_between(&sums, from, to) + BIN_COST).sum::<f64>()
+        };
+        let starts = ranges.iter().skip(1).map(|range| bucket_of(range.border_px));
+        let low_fits = ranges.iter().zip(starts.chain([BUCKETS])).all(|(range, to)| {
+            let from = bucket_of(range.border_px).min(to);
+            from == to || self.range_of_buckets(side, from, to).low_px >= range.low_px * LOW_TOLERANCE
+        });
+        low_fits && cost(ranges) <= cost(best) + BIN_COST
+    }
+
     /// Returns the range of buckets `from..to`, with its border in the empty buckets before it.
     fn range_of_buckets(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> CocRange {
         let total: u32 = side[from..to].iter().sum();
@@ -154,6 +180,18 @@ impl CocHistogram {
 
 /// Largest number of ranges per side.
 pub const MAX_RANGES: usize = 6;
+
+/// Returns the variance of ln |c| over the buckets `from..to`, times their fraction of the picture.
+fn variance_between(sums: &[[f64; 3]; BUCKETS + 1], from: usize, to: usize) -> f64 {
+    let [fraction, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
+    if fraction > 0.0 { (squares - sum * sum / fraction).max(0.0) } else { 0.0 }
+}
+
+/// Returns the first bucket that does not begin below a radius, in pixels.
+fn bucket_of(radius_px: f32) -> usize {
+    let bucket = (radius_px.to_bits() >> BUCKET_SHIFT).saturating_sub(FIRST) as usize;
+    (bucket + usize::from(bucket_edge_px(bucket) < radius_px)).min(BUCKETS)
+}
 
 /// Returns the lower edge of a bucket, in pixels.
 fn bucket_edge_px(bucket: usize) -> f32 {

@@ -46,3 +46,26 @@ named! {
         Off = "off",
     }
 }
+
+named! {
+    /// Whether a stream shows parts of the blurred background again that hardly change.
+    pub enum Reuse default Auto {
+        /// Keeps them in real time
+        Auto = "auto",
+        /// Keeps them in every stream and sequence
+        On = "on",
+        /// Blurs all of every frame
+        Off = "off",
+    }
+}
+
+impl Reuse {
+    /// Whether a stream keeps parts, in real time or not.
+    pub fn is_on(self, realtime: bool) -> bool {
+        match self {
+            Self::Auto => realtime,
+            Self::On => true,
+            Self::Off => false,
+        }
+    }
+}

@@ -26,7 +26,7 @@ pub use aperture::ApertureSetting;
 #[cfg(feature = "files")]
 pub use background::BackgroundSetting;
 pub use coc::{CocAtInfinity, CocRule};
-pub use effect::{BackgroundMemory, Effect, Refine};
+pub use effect::{BackgroundMemory, Effect, Refine, Reuse};
 pub use follow::FramingZoom;
 #[cfg(feature = "files")]
 pub use patch::{LookError, Value};
@@ -94,6 +94,8 @@ pub struct Look {
     pub highlights: f32,
     /// The quality level; `None` follows the time available.
     pub quality: Option<Quality>,
+    /// Whether a stream keeps parts of the result from earlier frames.
+    pub reuse: Reuse,
 }
 
 impl Default for Look {
@@ -117,6 +119,7 @@ impl Default for Look {
             // Off, as it invents light.
             highlights: 0.0,
             quality: None,
+            reuse: Reuse::Auto,
         }
     }
 }
@@ -176,6 +179,7 @@ impl Look {
             highlights: self.highlights,
             quality: self.quality.unwrap_or_default(),
             adaptive: adaptive && self.quality.is_none(),
+            reuse: self.reuse.is_on(adaptive),
             far_max_px,
             near_max_px,
         })

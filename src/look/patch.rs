@@ -51,6 +51,7 @@ impl Patch {
             rank: Some(look.rank.into()),
             highlights: Some(look.highlights),
             quality: Some(look.quality.into()),
+            reuse: Some(look.reuse),
         }
     }
 
@@ -126,7 +127,7 @@ impl Patch {
         macro_rules! set {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        set!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights);
+        set!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights, reuse);
         look.strength = self.merge_strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.value();

@@ -6,8 +6,8 @@ use std::str::FromStr;
 
 use super::number::{OrAuto, in_range_parser, parse_non_negative, parse_positive};
 use super::{
-    ApertureSetting, BackgroundMemory, BackgroundSetting, Effect, FramingZoom, Look, MAX_RADIUS_PX, Refine, Strength,
-    Tilt,
+    ApertureSetting, BackgroundMemory, BackgroundSetting, Effect, FramingZoom, Look, MAX_RADIUS_PX, Refine, Reuse,
+    Strength, Tilt,
 };
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
@@ -144,6 +144,8 @@ settings! {
     /// Quality level: changes fidelity, never the amount of blur. In real time, auto is the best level for the
     /// available time (--budget-ms), up to balanced on the CPU and best on a GPU; otherwise it is balanced
     quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of list_choices_with_auto::<Quality>();
+    /// Whether a stream keeps parts of the blurred background that hardly change
+    reuse: Reuse = "reuse" "WHEN" Computing Reuse::from_str, one of list_choices::<Reuse>();
 }
 
 /// Returns the setting with this name or alias; `None` if a look has no such setting.

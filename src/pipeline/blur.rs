@@ -187,7 +187,8 @@ impl<'a> Stage<'a> {
             return Err(Fault::LostFrame);
         };
         // Time in flight splits into the blur itself and the wait behind other frames.
-        let BlurredFrame { picture, mut color, mut depth, times, .. } = finished;
+        let BlurredFrame { picture, mut color, mut depth, times, reused, .. } = finished;
+        self.times.reused += f64::from(reused);
         let (now_ns, began_ns, queueing_ns) = (clock.now_ns(), done.since_ns, done.trace.queueing_ns);
         let (mut frame, InFlight { coc, crop, original }) = done.take_item(now_ns);
         frame.trace.blur_ns = self.record_times(&frame, &times, now_ns - began_ns);

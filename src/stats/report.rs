@@ -45,6 +45,8 @@ pub struct Report {
     pub misses: u64,
     /// Frames that reused the depth of an earlier one, warped with the picture, to save time.
     pub depth_held: u64,
+    /// Mean fraction of the blurred pictures that was kept from earlier frames, 0 to 1.
+    pub blur_reused: f64,
     /// How often a live output was sent its last picture again because no new one came.
     pub repeats: u64,
     /// `cpu`, `gpu` or `none`.
@@ -182,6 +184,7 @@ impl Report {
             budget_ms: to_ms(info.budget_ns),
             misses: timings.blur.misses,
             depth_held: timings.depth.reused,
+            blur_reused: timings.blur.reused / (timings.blur.took.samples().max(1) as f64),
             repeats: timings.sink.repeats + info.outputs.iter().map(|output| output.repeats).sum::<u64>(),
             backend,
             adapter,
@@ -269,6 +272,13 @@ impl fmt::Display for Report {
         }
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames reused that of an earlier frame, to save time", self.depth_held)?;
+        }
+        if self.blur_reused > 0.0 {
+            write!(
+                f,
+                "\nblur: {:.0} % of the pictures kept from earlier frames, as they hardly changed",
+                100.0 * self.blur_reused
+            )?;
         }
         // Only outputs that lost frames.
         let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);

@@ -82,6 +82,7 @@ pub fn settings(coc: CocKind) -> Settings {
         highlights: 0.0,
         quality: Quality::Balanced,
         adaptive: false,
+        reuse: false,
         far_max_px: 12.0,
         near_max_px: if coc == CocKind::Depth { 18.0 } else { 0.0 },
     }

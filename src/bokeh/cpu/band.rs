@@ -7,10 +7,12 @@ use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums};
 use super::fill::{HalfPictureBand, InpaintedBackground};
+use super::held::is_needed;
 use super::tent::{MARGIN, PADDED_BLOCK};
 use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, extend_range};
 use super::unpack::{InputFrame, Surfaces};
 use crate::bokeh::plan::{BinWeight, CELL, MAX_BINS};
+use crate::bokeh::reuse::Units;
 
 /// A band of rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
@@ -22,6 +24,8 @@ pub struct Band<'a> {
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
     /// Treatment of pixels that near objects occlude.
     pub inpainting: Inpainting<'a>,
+    /// What is kept from the last frame; `None` is nothing.
+    pub kept: Option<Kept<'a>>,
     /// Per block, the first bin that waits for inpainting, or [`NO_BIN`].
     pub first_pending: &'a mut [usize],
     /// Scratch memory of the thread.
@@ -37,6 +41,16 @@ pub enum Inpainting<'a> {
     Pending { layers: &'a [Layer], halves: HalfPictureBand<'a> },
     /// After inpainting: fills the blocks where a layer waited, for its bins only.
     Done { first: usize, background: InpaintedBackground<'a> },
+}
+
+/// What a frame keeps from the last one.
+#[derive(Clone, Copy)]
+pub struct Kept<'a> {
+    pub units: &'a Units,
+    /// How far around a result its bins are read, in pixels of the picture.
+    pub support_px: usize,
+    /// The bins that may be kept.
+    pub bins: [bool; MAX_BINS],
 }
 
 /// A layer behind others: its first bin, and the weight of a pixel's own content in it.
@@ -95,11 +109,15 @@ impl Band<'_> {
             Inpainting::Done { .. } => {}
         }
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
+        let keeps = self.kept.filter(|kept| {
+            let columns = block * BLOCK..(block + 1) * BLOCK;
+            !is_needed(kept.units, kept.support_px, columns, self.rows.clone())
+        });
         let mut active = [false; MAX_BINS];
         let mut support = 0;
         for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            if !is_filled && k >= self.first_pending[block] {
+            if !is_filled && k >= self.first_pending[block] || keeps.is_some_and(|kept| kept.bins[k]) {
                 continue;
             }
             *active = is_filled
@@ -112,7 +130,9 @@ impl Band<'_> {
                 false => bin.clear_block(block),
             }
         }
-        if !active.contains(&true) && !matches!(self.inpainting, Inpainting::Pending { .. }) {
+        // What is inpainted from a kept block may be of an earlier frame, too.
+        let is_read = matches!(self.inpainting, Inpainting::Pending { .. }) && keeps.is_none();
+        if !active.contains(&true) && !is_read {
             return;
         }
         let mut surfaces: Surfaces<PADDED_BLOCK> = Surfaces::new();

@@ -18,6 +18,7 @@ use super::filter::{
 use super::rows::{COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips};
 use crate::bokeh::bank::FilterBank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
+use crate::bokeh::reuse::Units;
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::{load, prefetch, store};
 
@@ -30,6 +31,10 @@ pub struct Strip<'a> {
     pub source: &'a Strips,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
+    /// What must be made anew; `None` is everything.
+    pub units: Option<&'a Units>,
+    /// Pixels of the picture per bin pixel and axis.
+    pub scale: usize,
     /// The coarse grid with the bin's coverage.
     pub cells: &'a CellGrid,
     /// Radius and range of colours, from `reach`.
@@ -64,6 +69,8 @@ pub struct Scratch {
     lines: Aligned,
     /// Rows of cells that have content to filter.
     filtered: Vec<bool>,
+    /// Rows of cells whose result is made.
+    made: Vec<bool>,
 }
 
 impl Scratch {
@@ -74,6 +81,7 @@ impl Scratch {
             rows: Aligned::zeros(ring_capacity(half_width) * max_row_len(TERMS_PER_GROUP.min(plan.ladder.max_terms()))),
             lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * half_width.next_multiple_of(COPY_WIDTH))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
+            made: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
     }
 }
@@ -114,19 +122,28 @@ impl Strip<'_> {
     }
 
     /// Finds the rows of cells that get a result (`active`) and those that must be filtered for it: most of a bin is
-    /// empty, because its surface covers part of the picture. Returns false if the strip stays empty.
+    /// empty, because its surface covers part of the picture. Returns false if nothing of the strip is made.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
         let (across, down) = (self.half_width.div_ceil(CELL), self.half_width.div_ceil(CELL));
         let rows = self.active.len();
         let first = self.strip * STRIP / CELL;
         let columns = first.saturating_sub(across)..(first + STRIP / CELL + across).min(self.cells.width);
-        let filtered = &mut self.scratch.filtered;
+        let Scratch { filtered, made, .. } = &mut *self.scratch;
         filtered.clear();
+        made.clear();
+        let columns_px = self.strip * STRIP * self.scale..(self.strip + 1) * STRIP * self.scale;
+        let row_px = CELL * self.scale;
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
+            let rows_px = y * row_px..(y + 1) * row_px;
+            if self.units.is_some_and(|units| !units.any_changed(columns_px.clone(), rows_px)) {
+                made.push(false);
+                continue;
+            }
             let support = y.saturating_sub(down)..(y + down + 1).min(rows);
             let active = filtered[support].iter().any(|&f| f);
+            made.push(active);
             let was = std::mem::replace(&mut self.active[y], active);
             // Clears the rows written in the previous frame; all others are zero already.
             if was && !active {
@@ -134,7 +151,7 @@ impl Strip<'_> {
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
             }
         }
-        self.active.iter().any(|&a| a)
+        made.contains(&true)
     }
 
     /// Filters `R` terms from `first` on: all rows, then all columns.
@@ -144,7 +161,7 @@ impl Strip<'_> {
         let rows = &mut scratch[..ring_capacity(self.half_width) * row_len::<S>(R)];
         let mut next_y = 0;
         for y in (0..self.size.1).step_by(BLOCK_ROWS) {
-            if !self.active[y / CELL] {
+            if !self.scratch.made[y / CELL] {
                 continue;
             }
             // The ring holds only the rows that the columns need, so that it stays in the nearest caches.

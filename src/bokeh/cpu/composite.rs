@@ -7,6 +7,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::encode::{CHUNK, EncodeTable};
+use super::held::HeldRow;
 use super::layers::Layers;
 use super::pixels::Sample;
 use super::rows::{COPY_WIDTH, STRIP, STRIP_ROW, Slot};
@@ -14,7 +15,8 @@ use super::silhouettes::Silhouettes;
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{InputFrame, compression_factor, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{Bin, Plan};
+use crate::bokeh::plan::{Bin, CELL, Plan};
+use crate::bokeh::reuse::is_kept;
 use crate::color::luminance;
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
@@ -37,6 +39,8 @@ pub struct Composite<'a, T> {
     pub y0: usize,
     /// Scratch memory of the thread.
     pub layers: &'a mut Layers,
+    /// The result of the last frame, where it may be kept.
+    pub held: Option<HeldRow<'a>>,
     /// Output: whole rows of RGB.
     pub out: &'a mut [T],
 }
@@ -57,6 +61,9 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
             let ranges = &self.tiles.ranges[tiles.clone()];
             let still = self.tiles.still[tiles].iter().all(|&still| still);
             let rows = self.y0..self.y0 + (out.len() / (width * 3)).max(1);
+            if self.show_held(out, x0, take, still) {
+                continue;
+            }
             let may_be_near = layered && self.silhouettes.may_be_near(rows.clone(), x0);
             if x0 + CHUNK < width {
                 self.prefetch(x0 + CHUNK, rows.len());
@@ -85,11 +92,56 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                 compress_highlights(&mut color.0, self.frame.expansion);
                 T::write(&color.0, self.encode, row);
             }
+            self.hold(out, x0, take, still);
         }
     }
 }
 
 impl<T> Composite<'_, T> {
+    /// Shows a chunk of the last result again, if nothing changed and no bin shows there that is never kept.
+    #[inline(always)]
+    fn show_held(&mut self, out: &mut [T], x0: usize, take: usize, still: bool) -> bool
+    where
+        T: Sample,
+    {
+        let Some(HeldRow { units: Some(units), picture, is_complete }) = &self.held else { return false };
+        let rows = self.y0..self.y0 + TILE_H;
+        if still || !is_complete[x0 / CHUNK] || units.any_changed(x0..x0 + take, rows) || self.has_fresh_content(x0) {
+            return false;
+        }
+        copy_chunk(picture, T::as_codes(out), self.plan.width, x0..x0 + take);
+        true
+    }
+
+    /// Keeps a chunk of the result for later frames.
+    #[inline(always)]
+    fn hold(&mut self, out: &mut [T], x0: usize, take: usize, still: bool)
+    where
+        T: Sample,
+    {
+        let is_complete = !still && self.held.is_some() && !self.has_fresh_content(x0);
+        let Some(held) = &mut self.held else { return };
+        held.is_complete[x0 / CHUNK] = is_complete;
+        if is_complete && let Some(out) = T::as_codes(out) {
+            copy_chunk(out, Some(held.picture), self.plan.width, x0..x0 + take);
+        }
+    }
+
+    /// Whether a bin whose result is never kept shows in a chunk of this row of tiles.
+    #[inline(always)]
+    fn has_fresh_content(&self, x0: usize) -> bool {
+        let fresh = self.plan.bins.iter().filter(|bin| !is_kept(bin));
+        fresh.filter(|bin| self.slots[bin.slot].present).any(|bin| {
+            let slot = &self.slots[bin.slot];
+            let rows = (self.y0 / bin.scale).saturating_sub(1)..((self.y0 + TILE_H) / bin.scale + 1).min(bin.height);
+            let strips = slot.strips((x0 / bin.scale).saturating_sub(1)..(x0 + CHUNK) / bin.scale + 1);
+            strips.into_iter().any(|strip| {
+                let first = rows.start - rows.start % CELL;
+                (first..rows.end).step_by(CELL).any(|y| slot.is_active(strip, y, bin.height))
+            })
+        })
+    }
+
     /// Prefetches the bins of a chunk of `rows` rows.
     #[inline(always)]
     fn prefetch(&self, x0: usize, rows: usize) {
@@ -147,6 +199,15 @@ impl<T> Composite<'_, T> {
                 }
             }
         }
+    }
+}
+
+/// Copies some columns of the rows of a picture.
+fn copy_chunk(from: &[u8], to: Option<&mut [u8]>, width: usize, columns: std::ops::Range<usize>) {
+    let Some(to) = to else { return };
+    let columns = columns.start * 3..columns.end * 3;
+    for (from, to) in from.chunks_exact(width * 3).zip(to.chunks_exact_mut(width * 3)) {
+        to[columns.clone()].copy_from_slice(&from[columns.clone()]);
     }
 }
 

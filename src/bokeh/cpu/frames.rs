@@ -47,7 +47,8 @@ impl Bokeh for CpuBokeh {
         self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
         let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times });
+        let reused = self.kept_fraction;
+        self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times, reused });
         Ok(())
     }
 

@@ -12,6 +12,7 @@ mod fill;
 mod filter;
 mod frames;
 mod gather;
+mod held;
 mod layers;
 mod levels;
 mod marking;
@@ -20,6 +21,7 @@ mod probe;
 mod reach;
 mod rows;
 mod silhouettes;
+mod survey;
 mod tent;
 mod tiles;
 mod unpack;
@@ -27,10 +29,11 @@ mod unpack;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::AtomicBool;
 
-use band::{Band, BandSums, Inpainting, Layer, NO_BIN};
+use band::{Band, BandSums, Inpainting, Kept, Layer, NO_BIN};
 use bin_parts::{BinParts, StripParts};
 use blur::{Scratch, Strip};
 use gather::Gather;
+use held::{Held, HeldRows, support_px};
 use marking::MarkSilhouettes;
 use pulp::Arch;
 use reach::DilateRadii;
@@ -44,6 +47,7 @@ use super::ladder::Compositing;
 use super::occlusion::MAX_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::quality_level::SCALES;
+use super::reuse::{Units, is_kept};
 use crate::budget::Quality;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool, core_count};
 
@@ -63,11 +67,14 @@ pub struct CpuBokeh {
     /// Per band and block, the first bin that waits for inpainting.
     first_pending: Vec<usize>,
     gather: Option<Gather>,
+    held: Option<Held>,
     thread_scratch: Vec<ThreadScratch>,
     /// Flags for [`DisjointParts`]: one per part of the largest pass.
     taken: Vec<AtomicBool>,
     /// The last frame, until it is collected.
     done: Option<BlurredFrame>,
+    /// Fraction of the last frame that was kept from earlier ones.
+    kept_fraction: f32,
 }
 
 /// Scratch memory of one thread.
@@ -77,6 +84,7 @@ struct ThreadScratch {
     dilation: Vec<f32>,
     blur: Scratch,
     layers: layers::Layers,
+    survey: Vec<u32>,
 }
 
 impl CpuBokeh {
@@ -94,6 +102,7 @@ impl CpuBokeh {
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
                 layers: layers::Layers::new(),
+                survey: Vec::with_capacity(if plan.reuse { width * 3 } else { 0 }),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -106,12 +115,14 @@ impl CpuBokeh {
             first_pending: vec![NO_BIN; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
             taken: flags(height.max(slots.len())),
-            plan,
             workers,
             slots,
             gather,
+            held: Held::new(&plan),
             thread_scratch,
             done: None,
+            kept_fraction: 0.0,
+            plan,
         }
     }
 
@@ -135,15 +146,25 @@ impl CpuBokeh {
         let frame = InputFrame::new(&self.plan, T::as_pixels(pixels), coc);
         self.split_bins(&frame);
         lap("split")?;
+        // Where results are kept, the bins' buffers keep what they are made from.
+        let mut held = self.held.take();
+        let mut units = None;
+        if let Some(held) = &mut held {
+            if self.find_kept(&frame, held) {
+                units = Some(held.detector.units());
+            }
+            lap("survey")?;
+        }
+        self.kept_fraction = units.map_or(0.0, Units::kept_fraction);
         // If something is in front, blocks where it occludes anything get the bins behind it after the inpainting.
-        self.compute_bins(&frame, None);
+        self.compute_bins(&frame, None, units);
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
                 pyramid.fill(&self.plan.visible_weight(layer.start), &self.silhouettes, &mut self.workers, self.arch);
             }
             lap("fill")?;
-            self.compute_bins(&frame, Some(layer));
+            self.compute_bins(&frame, Some(layer), units);
             lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
@@ -154,10 +175,12 @@ impl CpuBokeh {
         } else {
             self.dilate_radii();
             lap("reach")?;
-            self.blur_bins();
+            self.blur_bins(units);
             lap("blur")?;
         }
-        self.composite(&frame, pixels, out);
+        let kept = self.kept_fraction > 0.0;
+        self.composite(&frame, pixels, out, held.as_mut().and_then(|held| held.rows(kept)));
+        self.held = held;
         lap("composite")
     }
 
@@ -215,7 +238,7 @@ impl CpuBokeh {
     }
 
     /// Pass `bin`: all bins, or those of a `layer` in the blocks that waited for its inpainting.
-    fn compute_bins(&mut self, frame: &InputFrame<'_>, layer: Option<Range<usize>>) {
+    fn compute_bins(&mut self, frame: &InputFrame<'_>, layer: Option<Range<usize>>, units: Option<&Units>) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
         // Bands of at least 32 rows, because each reads some rows of its neighbours again.
@@ -238,6 +261,7 @@ impl CpuBokeh {
             (*layer, count) = (layer_from(range.start), count + 1);
         }
         let layers = &layers[..count];
+        let (support_px, kept_bins) = (support_px(plan), plan.kept_bins());
         let (halves, filled) = match (&mut self.pyramid, layer) {
             (Some(pyramid), Some(Range { start: first, .. })) => {
                 (None, Some((first, pyramid.background(&self.silhouettes, plan, first))))
@@ -257,6 +281,7 @@ impl CpuBokeh {
                 rows: band * rows..(band + 1) * rows,
                 bins: std::array::from_fn(|k| bin_parts[k].as_ref().map(|bin_part| bin_part.part(band))),
                 inpainting,
+                kept: units.map(|units| Kept { units, support_px, bins: kept_bins }),
                 first_pending: first_pending.part(band),
                 sums: &mut thread.sums,
             });
@@ -277,7 +302,7 @@ impl CpuBokeh {
     }
 
     /// Pass `blur`: each part is a strip. The strips of all bins are numbered consecutively, so that no thread idles.
-    fn blur_bins(&mut self) {
+    fn blur_bins(&mut self, units: Option<&Units>) {
         let (plan, arch) = (&self.plan, self.arch);
         let mut strip_parts: [Option<StripParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
@@ -300,6 +325,8 @@ impl CpuBokeh {
             arch.dispatch(Strip {
                 source: strip_part.source,
                 size: (bin.width, bin.height),
+                units: units.filter(|_| is_kept(bin)),
+                scale: bin.scale,
                 cells: strip_part.cells,
                 edges: strip_part.edges,
                 bank: &plan.bank,
@@ -315,7 +342,13 @@ impl CpuBokeh {
     }
 
     /// Pass `composite`: each part is a row of tiles.
-    fn composite<T: Sample>(&mut self, frame: &InputFrame<'_>, pixels: &[T], out: &mut [T]) {
+    fn composite<T: Sample>(
+        &mut self,
+        frame: &InputFrame<'_>,
+        pixels: &[T],
+        out: &mut [T],
+        held: Option<HeldRows<'_>>,
+    ) {
         let width = self.plan.width;
         let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
@@ -327,6 +360,7 @@ impl CpuBokeh {
             &|thread: &mut ThreadScratch, part| {
                 let (y0, layers) = (part * TILE_H, &mut thread.layers);
                 let out = out.part(part);
+                let held = held.as_ref().map(|rows| rows.part(part));
                 arch.dispatch(composite::Composite {
                     plan,
                     slots,
@@ -338,6 +372,7 @@ impl CpuBokeh {
                     encode,
                     y0,
                     layers,
+                    held,
                     out,
                 });
             },

@@ -40,6 +40,9 @@ pub trait Sample: Copy + Send + Sync {
     /// Wraps samples as pixels of their kind.
     fn as_pixels(samples: &[Self]) -> Pixels<'_>;
 
+    /// Returns samples as 8-bit codes, if they are.
+    fn as_codes(samples: &mut [Self]) -> Option<&mut [u8]>;
+
     /// Writes a chunk of linear light as samples; `out` may be shorter.
     fn write(color: &[[f32; CHUNK]; 3], encode: &EncodeTable, out: &mut [Self]);
 }
@@ -47,6 +50,10 @@ pub trait Sample: Copy + Send + Sync {
 impl Sample for u8 {
     fn as_pixels(samples: &[u8]) -> Pixels<'_> {
         Pixels::Srgb(samples)
+    }
+
+    fn as_codes(samples: &mut [u8]) -> Option<&mut [u8]> {
+        Some(samples)
     }
 
     #[inline(always)]
@@ -58,6 +65,10 @@ impl Sample for u8 {
 impl Sample for f32 {
     fn as_pixels(samples: &[f32]) -> Pixels<'_> {
         Pixels::Linear(samples)
+    }
+
+    fn as_codes(_: &mut [f32]) -> Option<&mut [u8]> {
+        None
     }
 
     #[inline(always)]

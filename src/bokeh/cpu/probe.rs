@@ -37,6 +37,11 @@ impl CpuBokeh {
         }
     }
 
+    /// Returns which fraction of the last frame was kept from earlier ones, 0 to 1.
+    pub fn kept_fraction(&self) -> f32 {
+        self.kept_fraction
+    }
+
     /// Returns the plan, with the bins of the last frame.
     pub fn plan(&self) -> &Plan {
         &self.plan

@@ -42,6 +42,7 @@ fn compare_with_cpu(device: &Arc<Device>) -> Result<SelfTest, BokehError> {
         highlights: 4.0,
         quality: Quality::default(),
         adaptive: false,
+        reuse: false,
         far_max_px: RADIUS_PX,
         near_max_px: RADIUS_PX,
     };

@@ -13,6 +13,7 @@ fn settings(coc: CocKind, quality: Quality) -> Settings {
         highlights: 0.0,
         quality,
         adaptive: false,
+        reuse: false,
         far_max_px: 16.0,
         near_max_px: 30.0,
     }

@@ -12,6 +12,7 @@ mod mask_postprocess;
 mod person;
 mod picture_network;
 mod relative_depth;
+mod stillness;
 mod subject_mask;
 
 use std::path::Path;
@@ -233,6 +234,10 @@ impl DepthSource for SingleCamera {
         self.effort = effort.min(DEPTH_INTERVALS.len() - 1);
         // Effort is only reduced when time is short, so frames arrive in real time.
         self.is_live = true;
+    }
+
+    fn set_reuse(&mut self, on: bool) {
+        self.person.iter_mut().for_each(|person| person.set_reuse(on));
     }
 
     fn seek(&mut self, _: i64) {

@@ -40,6 +40,11 @@ impl PersonSegmenter {
         self.seen_ns = None;
     }
 
+    /// Sets whether the mask of an earlier picture serves for one that hardly differs.
+    pub fn set_reuse(&mut self, on: bool) {
+        self.picture_network.set_reuse(on);
+    }
+
     /// Returns the mask of the last picture.
     pub fn mask(&self) -> &Mask {
         &self.mask
@@ -51,7 +56,11 @@ impl PersonSegmenter {
     /// # Errors
     /// See [`PictureNetwork::infer`].
     pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
-        let output = self.picture_network.infer(color)?;
+        self.picture_network.set_picture(color);
+        if self.picture_network.is_still() {
+            return Ok(());
+        }
+        let output = self.picture_network.run()?;
         let pixels = output.size.0 * output.size.1;
         let beyond = |alpha: f32| !(-0.01..=1.01).contains(&alpha);
         self.is_logits |= (0..pixels).any(|pixel| beyond(output.at(pixel, output.channels - 1)));

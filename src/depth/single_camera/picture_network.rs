@@ -1,5 +1,6 @@
 //! Feeds pictures to a network: input layout and scaling, and the selection of its output.
 
+use super::stillness::StillnessDetector;
 use crate::frame::ColorImage;
 use crate::frame::scale::RowScaler;
 use crate::network::{LoadedNetwork, Network, Port, Scaling, Task, Tensor};
@@ -35,6 +36,8 @@ pub struct PictureNetwork {
     scale: RowScaler,
     row: Vec<u16>,
     scaled: Vec<u8>,
+    /// Detects pictures like the last one that the network ran on; `None` runs it on every picture.
+    stillness: Option<StillnessDetector>,
 }
 
 /// A network's output: one or two channels, of the network's own size.
@@ -131,6 +134,7 @@ impl PictureNetwork {
             scale: RowScaler::default(),
             row: Vec::new(),
             scaled: Vec::new(),
+            stillness: None,
         })
     }
 
@@ -139,15 +143,20 @@ impl PictureNetwork {
         for &(input, _) in &self.recurrent_states {
             self.inputs[input].values.fill(0.0);
         }
+        self.stillness.iter_mut().for_each(StillnessDetector::reset);
     }
 
-    /// Runs the network on a picture.
-    ///
-    /// # Errors
-    /// See [`Self::run`].
-    pub fn infer(&mut self, color: &ColorImage) -> Result<NetworkOutput<'_>, String> {
-        self.set_picture(color);
-        self.run()
+    /// Sets whether [`Self::is_still`] looks for pictures that hardly differ.
+    pub fn set_reuse(&mut self, on: bool) {
+        if self.stillness.is_some() != on {
+            self.stillness = on.then(|| StillnessDetector::new(self.size));
+        }
+    }
+
+    /// Whether the picture that was set hardly differs from the last one for which this returned false, so that the
+    /// network would return the same.
+    pub fn is_still(&mut self) -> bool {
+        self.stillness.as_mut().is_some_and(StillnessDetector::is_still)
     }
 
     /// Runs the network on the picture set by [`Self::set_picture`].
@@ -177,6 +186,7 @@ impl PictureNetwork {
         let values = &mut self.inputs[self.picture].values;
         for y in 0..height {
             self.scale.scale_row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
+            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, &self.scaled));
             for (x, pixel) in self.scaled.as_chunks::<3>().0.iter().enumerate() {
                 for c in 0..3 {
                     let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };

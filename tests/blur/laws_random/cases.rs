@@ -118,6 +118,7 @@ impl Random {
             highlights: if self.below(2) == 0 { 0.0 } else { self.of(&[1.0, 8.0, 100.0]) * self.share() },
             quality: self.of(&Quality::ALL),
             adaptive: self.below(2) == 0,
+            reuse: false,
             far_max_px,
             near_max_px,
         }

@@ -9,7 +9,7 @@ use bokehcam::look::{Look, Patch};
 /// # Errors
 /// Fails if a lens lacks some of its numbers, or the aperture's picture cannot be read.
 pub fn build_look(blur: &options::Blur, quality: &options::LookSettings<true>) -> Result<Look, CliError> {
-    let patch = Patch { quality: quality.0.quality, ..blur.look.0.clone() };
+    let patch = Patch { quality: quality.0.quality, reuse: quality.0.reuse, ..blur.look.0.clone() };
     Ok(patch.apply_to(&Look::default())?)
 }
 

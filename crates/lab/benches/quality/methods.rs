@@ -157,6 +157,7 @@ impl Blurrer {
             highlights: 0.0,
             quality,
             adaptive: false,
+            reuse: false,
             far_max_px: shot.lens.coc_at_infinity_px,
             near_max_px: shot.lens.max_coc_px,
         };

@@ -1,0 +1,181 @@
+//! Results that are kept from frame to frame: what may be kept, and how far it may be from a fresh result.
+#![allow(missing_docs)]
+
+use crate::common;
+
+use bokehcam::bokeh::Settings;
+use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::plan::Plan;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::{CocField, CocKind};
+use common::{COC_KINDS, DOF, coc, codes_apart, color, depth, settings};
+
+const SIZE: (u32, u32) = (512, 256);
+
+/// Two executors over the same frames: one keeps what hardly changes, one makes every frame anew.
+struct Both {
+    keeping: CpuBokeh,
+    fresh: CpuBokeh,
+    field: CocField,
+}
+
+/// One frame: the result of the executor that keeps, the fresh one, and the fraction kept.
+struct Pair {
+    kept: ColorImage,
+    fresh: ColorImage,
+    fraction: f32,
+}
+
+impl Both {
+    fn new(kind: CocKind, threads: usize) -> Self {
+        let executor =
+            |reuse| CpuBokeh::new(Plan::new(&Settings { reuse, ..settings(kind) }, SIZE.0, SIZE.1), Some(threads));
+        Self { keeping: executor(true), fresh: executor(false), field: coc(kind, SIZE.1) }
+    }
+
+    fn blur(&mut self, color: &ColorImage, map: &DepthMap) -> Pair {
+        let [mut kept, mut fresh] = [const { ColorImage { width: 0, height: 0, rgb: Vec::new() } }; 2];
+        self.keeping.blur(color, Some(map), &self.field, &mut kept).expect("a fitting frame");
+        self.fresh.blur(color, Some(map), &self.field, &mut fresh).expect("a fitting frame");
+        assert_eq!(self.fresh.kept_fraction(), 0.0);
+        Pair { kept, fresh, fraction: self.keeping.kept_fraction() }
+    }
+}
+
+/// A room of soft shapes and sharp edges behind a subject whose left side is at column `subject_x`, 100 wide.
+fn scene(subject_x: u32, light: f32, noise: impl Fn(u32, u32) -> f32) -> (ColorImage, DepthMap) {
+    let is_subject = |x: u32, y: u32| (subject_x..subject_x + 100).contains(&x) && y > 90;
+    let picture = color(SIZE.0, SIZE.1, |x, y| {
+        let room = if (x / 40 + y / 30) % 2 == 0 { 70.0 } else { 150.0 + 0.1 * x as f32 };
+        let value = if is_subject(x, y) { 110.0 + 60.0 * f32::from((x / 3 + y / 3) % 2 == 0) } else { room };
+        let code = |offset: f32| (value + light + offset + noise(x, y)).round().clamp(0.0, 255.0) as u8;
+        [code(0.0), code(8.0), code(-15.0)]
+    });
+    (picture, depth(SIZE.0, SIZE.1, |x, y| if is_subject(x, y) { 1.0 } else { 3.5 }))
+}
+
+/// Independent noise of `amplitude` codes around 0, different in each frame.
+fn sensor(frame: u32, amplitude: f32) -> impl Fn(u32, u32) -> f32 {
+    move |x, y| {
+        let mut hash = (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ frame.wrapping_mul(0xC2B2_AE3D))
+            .wrapping_mul(0x27D4_EB2F);
+        hash ^= hash >> 15;
+        hash = hash.wrapping_mul(0x2C1B_3C6D);
+        amplitude * ((hash >> 8) as f32 / 8_388_608.0 - 1.0)
+    }
+}
+
+fn mean_apart(a: &ColorImage, b: &ColorImage) -> f64 {
+    let total: u64 = a.rgb.iter().zip(&b.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    total as f64 / a.rgb.len() as f64
+}
+
+#[test]
+fn a_still_scene_is_kept_and_stays_the_same_to_the_bit() {
+    for kind in COC_KINDS {
+        let mut both = Both::new(kind, 2);
+        let (picture, map) = scene(200, 0.0, |_, _| 0.0);
+        let first = both.blur(&picture, &map);
+        assert_eq!((first.fraction, &first.kept), (0.0, &first.fresh), "{kind:?}");
+        let mut renewed = 0;
+        for frame in 1..200 {
+            let next = both.blur(&picture, &map);
+            assert!(next.fraction > 0.7, "{kind:?} {frame}: {}", next.fraction);
+            assert_eq!(next.kept, first.fresh, "{kind:?} {frame}");
+            renewed += u32::from(next.fraction < 1.0);
+        }
+        assert!(renewed > 0, "{kind:?}: everything is made anew at times");
+    }
+}
+
+#[test]
+fn noise_is_kept_out_of_the_background_and_the_subject_is_fresh() {
+    let mut both = Both::new(CocKind::Depth, 2);
+    let (mut fractions, mut moved) = (Vec::new(), [0.0; 2]);
+    let mut before: Option<Pair> = None;
+    for frame in 0..60 {
+        let (picture, map) = scene(200, 0.0, sensor(frame, 6.0));
+        let pair = both.blur(&picture, &map);
+        assert!(codes_apart(&pair.kept, &pair.fresh) <= 3, "{frame}: {}", codes_apart(&pair.kept, &pair.fresh));
+        assert!(mean_apart(&pair.kept, &pair.fresh) <= 0.5, "{frame}");
+        let subject = |image: &ColorImage| -> Vec<u8> {
+            (150..250).flat_map(|y| image.rgb[(y * 512 + 230) * 3..(y * 512 + 270) * 3].to_vec()).collect()
+        };
+        assert_eq!(subject(&pair.kept), subject(&picture), "{frame}: what is in focus is the camera's");
+        if let Some(before) = &before
+            && frame > 40
+        {
+            fractions.push(pair.fraction);
+            moved[0] += mean_apart(&before.kept, &pair.kept);
+            moved[1] += mean_apart(&before.fresh, &pair.fresh);
+        }
+        before = Some(pair);
+    }
+    assert!(fractions.iter().sum::<f32>() / fractions.len() as f32 > 0.5, "{fractions:?}");
+    assert!(moved[0] < 0.8 * moved[1], "the background flickers less: {moved:?}");
+}
+
+#[test]
+fn a_moving_subject_leaves_no_trail() {
+    let mut both = Both::new(CocKind::Depth, 2);
+    for frame in 0..80u32 {
+        // To the right, then it rests.
+        let (picture, map) = scene(40 + 6 * frame.min(50), 0.0, |_, _| 0.0);
+        let pair = both.blur(&picture, &map);
+        let (worst, mean) = (codes_apart(&pair.kept, &pair.fresh), mean_apart(&pair.kept, &pair.fresh));
+        assert!(worst <= 2 && mean <= 0.1, "{frame}: {worst} {mean}");
+    }
+}
+
+#[test]
+fn slow_drifts_and_steps_of_the_light_are_followed() {
+    for kind in COC_KINDS {
+        let mut both = Both::new(kind, 2);
+        for frame in 0..120u32 {
+            let drift = 0.12 * frame as f32 + if frame > 80 { 20.0 } else { 0.0 };
+            // Dithered, as a sensor's noise does.
+            let (picture, map) = scene(200, drift, sensor(7, 0.5));
+            let pair = both.blur(&picture, &map);
+            let (worst, mean) = (codes_apart(&pair.kept, &pair.fresh), mean_apart(&pair.kept, &pair.fresh));
+            assert!(worst <= 2 && mean <= 0.75, "{kind:?} {frame}: {worst} {mean}");
+        }
+    }
+}
+
+#[test]
+fn another_scene_focus_or_nearer_object_is_made_anew() {
+    let mut both = Both::new(CocKind::Depth, 2);
+    let (picture, map) = scene(200, 0.0, |_, _| 0.0);
+    let (other, other_map) = scene(60, 40.0, |x, _| (x % 7) as f32);
+    let near =
+        depth(SIZE.0, SIZE.1, |x, y| if x < 100 && y > 120 { 0.4 } else { map.metres[(y * SIZE.0 + x) as usize] });
+    for (name, picture, map) in
+        [("cut", &other, &other_map), ("back", &picture, &map), ("near", &picture, &near), ("gone", &picture, &map)]
+    {
+        let pair = both.blur(picture, map);
+        assert_eq!((pair.fraction, &pair.kept), (0.0, &pair.fresh), "{name}");
+        if name != "near" {
+            for _ in 0..6 {
+                let pair = both.blur(picture, map);
+                assert_eq!(pair.kept, pair.fresh, "{name}");
+            }
+        }
+    }
+    let CocField::Depth(lens) = DOF else { unreachable!() };
+    for frame in 0..30 {
+        both.field = CocField::Depth(bokehcam::optics::DepthCoc { focus_m: 1.0 + 0.01 * frame as f32, ..lens });
+        let pair = both.blur(&picture, &map);
+        assert!(codes_apart(&pair.kept, &pair.fresh) <= 3 && mean_apart(&pair.kept, &pair.fresh) <= 0.5, "{frame}");
+    }
+}
+
+#[test]
+fn the_same_frames_give_the_same_pictures_on_any_number_of_threads() {
+    let mut executors = [1, 2, 3].map(|threads| Both::new(CocKind::Depth, threads));
+    for frame in 0..40u32 {
+        let (picture, map) = scene(60 + 3 * (frame / 10), 0.0, sensor(frame, 4.0));
+        let [one, two, three] = executors.each_mut().map(|both| both.blur(&picture, &map));
+        assert_eq!((&one.kept, one.fraction), (&two.kept, two.fraction), "{frame}");
+        assert_eq!((&one.kept, one.fraction), (&three.kept, three.fraction), "{frame}");
+    }
+}
