@@ -18,6 +18,11 @@ const DEVIATIONS: f32 = 5.0;
 /// Fraction of a normal distribution's absolute values below [`QUARTILE`] standard deviations.
 const QUARTER: usize = 4;
 const QUARTILE: f32 = 0.3186;
+/// Differences, in the same units, of the held content from that of which a result was made that count, and the fraction
+/// of the bound of the CoC. Most of the content stays, so it has less noise; and while content that differs from its
+/// neighbours is blurred, results that do would show a seam.
+const RESULT_BOUND: [f32; 2] = [0.5, 0.8];
+const RESULT_COC_BOUND: f32 = 0.6;
 /// Change of the CoC that counts, as a fraction of the smallest kept radius, and at least in pixels.
 const COC_BOUND: (f32, f32) = (0.015, 0.1);
 /// Fraction of the difference by which the known noise follows the measured one, upwards and downwards.
@@ -69,26 +74,43 @@ impl TileMeans {
         Self { planes: std::array::from_fn(|_| vec![0.0; across * down]), across, down }
     }
 
+    /// Copies the marked units, `across` tiles wide, of some rows of tiles.
+    fn copy_units(&mut self, from: &Self, rows: Range<usize>, across: usize, units: &[bool]) {
+        for row in rows.start..rows.end.min(self.down) {
+            let tiles = row * self.across..(row + 1) * self.across;
+            for (from, to) in from.planes.iter().zip(&mut self.planes) {
+                let (from, to) = (from[tiles.clone()].chunks(across), to[tiles.clone()].chunks_mut(across));
+                for (_, (from, to)) in units.iter().zip(from.zip(to)).filter(|(unit, _)| **unit) {
+                    to.copy_from_slice(from);
+                }
+            }
+        }
+    }
+
     /// Compares every tile, whatever its CoC.
     pub fn ignore_coc(&mut self) {
         self.planes[3].fill(f32::from(u8::MAX));
     }
 }
 
-/// Predicted luma, chroma (2) and CoC of each tile.
+/// Predicted luma, chroma (2) and CoC of each tile, of three pictures: the current frame, the **content** that is held
+/// in its place, and the content from which the **result** was made.
 pub struct Prediction {
     /// Means of the current frame, to be written before [`Prediction::predict`].
     pub means: TileMeans,
+    /// Means of the held content.
+    content: TileMeans,
     now: TileMeans,
     /// Of the previous frame, to measure the noise.
     before: TileMeans,
-    /// Of the frame from which a tile's result was made.
+    held: TileMeans,
     made: TileMeans,
     scratch: Vec<f32>,
     /// Standard deviation of luma and chroma from frame to frame, in codes.
     noise: [f32; 2],
     /// Change that counts: luma, chroma (2) and CoC.
     bounds: [f32; MEANS],
+    weights: Weights,
     has_before: bool,
 }
 
@@ -97,12 +119,15 @@ impl Prediction {
         let means = TileMeans::new(width, height);
         Self {
             scratch: vec![0.0; means.across * means.down],
+            content: means.clone(),
             now: means.clone(),
             before: means.clone(),
+            held: means.clone(),
             made: means.clone(),
             means,
             noise: [0.0; 2],
             bounds: [0.0; MEANS],
+            weights: Weights::of_disc(0.0),
             has_before: false,
         }
     }
@@ -111,17 +136,8 @@ impl Prediction {
     #[inline(always)]
     pub fn predict(&mut self, radius_px: f32) {
         std::mem::swap(&mut self.now, &mut self.before);
-        let weights = Weights::of_disc(radius_px);
-        let (across, down) = (self.means.across, self.means.down);
-        for (means, now) in self.means.planes.iter().zip(&mut self.now.planes) {
-            average(means, (across, down), weights, &mut self.scratch, now);
-        }
-        let [red, green, blue, _] = &mut self.now.planes;
-        for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
-            let (red, green, blue) = (r.sqrt(), g.sqrt(), b.sqrt());
-            let luma = 0.299 * red + 0.587 * green + 0.114 * blue;
-            (*r, *g, *b) = (luma, 0.564 * (blue - luma), 0.713 * (red - luma));
-        }
+        self.weights = Weights::of_disc(radius_px);
+        predict_result(&self.means, self.weights, &mut self.scratch, &mut self.now);
         if self.has_before {
             self.measure_noise();
         }
@@ -152,53 +168,83 @@ impl Prediction {
                 below * QUARTER >= total
             });
             let noise = (quartile.unwrap_or(0) as f32 + 0.5) / BUCKETS_PER_CODE / QUARTILE;
-            self.noise[k] += (noise - self.noise[k]) * if noise < self.noise[k] { NOISE_FALL } else { NOISE_RISE };
+            let follow = match self.noise[k] {
+                0.0 => 1.0,
+                known if noise < known => NOISE_FALL,
+                _ => NOISE_RISE,
+            };
+            self.noise[k] += (noise - self.noise[k]) * follow;
         }
     }
 
-    /// Marks the units, `across` tiles wide, of some rows of tiles in which any tile changed.
+    /// Marks the units, `across` tiles wide, of some rows of tiles where the frame differs from the held content.
     pub fn find_changed(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
-        let [luma, blue, red, coc] = std::array::from_fn(|plane| (&self.now.planes[plane], &self.made.planes[plane]));
-        for row in rows.start..rows.end.min(self.now.down) {
-            let tiles = row * self.now.across..(row + 1) * self.now.across;
-            for (unit, first) in units.iter_mut().zip(tiles.clone().step_by(across)) {
-                let tiles = first..(first + across).min(tiles.end);
-                let of = |(now, made): (&'_ Vec<f32>, &'_ Vec<f32>), tile: usize| (now[tile], made[tile]);
-                let moved = |plane, tile: usize, bound: f32| {
-                    let (now, made) = of(plane, tile);
-                    (now - made).abs() > bound
-                };
-                *unit |= tiles.into_iter().any(|tile| {
-                    let (now_px, made_px) = of(coc, tile);
-                    let is_blurred = now_px.abs().max(made_px.abs()) > IN_FOCUS_PX;
-                    let [of_luma, of_blue, of_red, of_coc] = self.bounds;
-                    is_blurred
-                        && (moved(luma, tile, of_luma)
-                            | moved(blue, tile, of_blue)
-                            | moved(red, tile, of_red)
-                            | ((now_px - made_px).abs() > of_coc))
-                });
-            }
-        }
+        mark_different(&self.now, &self.held, &self.bounds, rows, across, units);
     }
 
-    /// Makes the current frame the reference of the marked units.
-    pub fn refer_to(&mut self, rows: Range<usize>, across: usize, units: &[bool]) {
-        for row in rows.start..rows.end.min(self.now.down) {
-            let tiles = row * self.now.across..(row + 1) * self.now.across;
-            for (now, made) in self.now.planes.iter().zip(&mut self.made.planes) {
-                let (now, made) = (now[tiles.clone()].chunks(across), made[tiles.clone()].chunks_mut(across));
-                for (_, (now, made)) in units.iter().zip(now.zip(made)).filter(|(unit, _)| **unit) {
-                    made.copy_from_slice(now);
-                }
-            }
-        }
+    /// Replaces the held content of the marked units by the current frame's.
+    pub fn hold(&mut self, rows: Range<usize>, across: usize, units: &[bool]) {
+        self.content.copy_units(&self.means, rows, across, units);
     }
 
-    /// Makes the current frame the reference of the whole picture.
-    pub fn refer_to_all(&mut self) {
-        for (now, made) in self.now.planes.iter().zip(&mut self.made.planes) {
-            made.copy_from_slice(now);
+    /// Predicts the result of the held content.
+    #[inline(always)]
+    pub fn predict_held(&mut self) {
+        predict_result(&self.content, self.weights, &mut self.scratch, &mut self.held);
+    }
+
+    /// Marks the units of some rows of tiles where the held content differs from that of which the result was made.
+    pub fn find_outdated(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
+        let [luma, chroma] = RESULT_BOUND;
+        let bounds = [luma, chroma, chroma, RESULT_COC_BOUND * self.bounds[3]];
+        mark_different(&self.held, &self.made, &bounds, rows, across, units);
+    }
+
+    /// Notes that the results of the marked units are made of the held content.
+    pub fn make(&mut self, rows: Range<usize>, across: usize, units: &[bool]) {
+        self.made.copy_units(&self.held, rows, across, units);
+    }
+
+    /// Holds the current frame, and notes that all results are made of it.
+    pub fn make_all(&mut self) {
+        for (from, to) in [(&self.means, &mut self.content), (&self.now, &mut self.held), (&self.now, &mut self.made)] {
+            from.planes.iter().zip(&mut to.planes).for_each(|(from, to)| to.copy_from_slice(from));
+        }
+    }
+}
+
+/// Averages means over about a disc, as luma, chroma (2) and CoC.
+#[inline(always)]
+fn predict_result(means: &TileMeans, weights: Weights, scratch: &mut [f32], out: &mut TileMeans) {
+    let size = (out.across, out.down);
+    for (means, out) in means.planes.iter().zip(&mut out.planes) {
+        average(means, size, weights, scratch, out);
+    }
+    let [red, green, blue, _] = &mut out.planes;
+    for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
+        let (red, green, blue) = (r.sqrt(), g.sqrt(), b.sqrt());
+        let luma = 0.299 * red + 0.587 * green + 0.114 * blue;
+        (*r, *g, *b) = (luma, 0.564 * (blue - luma), 0.713 * (red - luma));
+    }
+}
+
+/// Marks the units in which any blurred tile of two predictions differs by more than `bounds`.
+fn mark_different(
+    a: &TileMeans,
+    b: &TileMeans,
+    bounds: &[f32; MEANS],
+    rows: Range<usize>,
+    across: usize,
+    units: &mut [bool],
+) {
+    for row in rows.start..rows.end.min(a.down) {
+        let tiles = row * a.across..(row + 1) * a.across;
+        let [a, b] = [a, b].map(|side| side.planes.each_ref().map(|plane| &plane[tiles.clone()]));
+        for (unit, first) in units.iter_mut().zip((0..tiles.len()).step_by(across)) {
+            *unit |= (first..(first + across).min(tiles.len())).any(|tile| {
+                let is_blurred = a[3][tile].abs().max(b[3][tile].abs()) > IN_FOCUS_PX;
+                is_blurred && (0..MEANS).any(|plane| (a[plane][tile] - b[plane][tile]).abs() > bounds[plane])
+            });
         }
     }
 }

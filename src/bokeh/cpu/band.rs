@@ -3,11 +3,12 @@
 //!
 //! twin: shaders/bin.wgsl
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
-use super::bin::{BinRows, BinSums};
+use super::bin::{BinRows, BinSums, Run};
 use super::fill::{HalfPictureBand, InpaintedBackground};
-use super::held::is_needed;
 use super::tent::{MARGIN, PADDED_BLOCK};
 use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, extend_range};
 use super::unpack::{InputFrame, Surfaces};
@@ -19,7 +20,7 @@ pub struct Band<'a> {
     pub source: InputFrame<'a>,
     pub tiles: &'a Tiles,
     /// Range of rows.
-    pub rows: std::ops::Range<usize>,
+    pub rows: Range<usize>,
     /// Buffers of the bins to fill, by the bin's index in the plan.
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
     /// Treatment of pixels that near objects occlude.
@@ -43,14 +44,22 @@ pub enum Inpainting<'a> {
     Done { first: usize, background: InpaintedBackground<'a> },
 }
 
-/// What a frame keeps from the last one.
+/// What the bins keep from earlier frames.
 #[derive(Clone, Copy)]
 pub struct Kept<'a> {
-    pub units: &'a Units,
-    /// How far around a result its bins are read, in pixels of the picture.
-    pub support_px: usize,
+    /// The content that must be made anew.
+    pub content: &'a Units,
     /// The bins that may be kept.
     pub bins: [bool; MAX_BINS],
+}
+
+/// Which bins of a part of a block are made.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Making {
+    Nothing,
+    /// Those that are never kept.
+    Fresh,
+    All,
 }
 
 /// A layer behind others: its first bin, and the weight of a pixel's own content in it.
@@ -89,14 +98,13 @@ impl WithSimd for Band<'_> {
 }
 
 impl Band<'_> {
-    /// Adds one block of columns to every bin that it contributes to. In the first pass, a block with occluded pixels
-    /// does only the bins in front of the first layer that needs inpainting; the passes for the layers behind
-    /// ([`Inpainting::Done`]) do the others.
+    /// Adds one block of columns to every bin that it contributes to, as far as they are not kept. In the first pass, a
+    /// block with occluded pixels does only the bins in front of the first layer that needs inpainting; the passes for
+    /// the layers behind ([`Inpainting::Done`]) do the others.
     #[inline(always)]
     fn process_block<V: Simd>(&mut self, simd: V, block: usize) {
-        // One tile more on every side, because the averages of a cell include pixels of its neighbours.
-        let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
-        let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
+        let columns = block_columns(block, self.source.size.0);
+        let (tile_columns, tile_rows) = self.tiles_around(block * BLOCK..(block + 1) * BLOCK);
         match &self.inpainting {
             Inpainting::NotNeeded => self.first_pending[block] = NO_BIN,
             Inpainting::Pending { layers, .. } => {
@@ -108,16 +116,67 @@ impl Band<'_> {
             Inpainting::Done { first, .. } if self.first_pending[block] > *first => return,
             Inpainting::Done { .. } => {}
         }
+        // Adjacent units that make the same bins are done together.
+        let step = self.kept.map_or(columns, |kept| kept.content.width_px());
+        let end = block * BLOCK + columns;
+        let mut x0 = block * BLOCK;
+        while x0 < end {
+            let making = self.find_making(x0);
+            let mut next = x0 + step;
+            while next < end && self.find_making(next) == making {
+                next += step;
+            }
+            let columns = next.min(end) - x0;
+            let is_whole = x0 == block * BLOCK && next >= end;
+            if making != Making::Nothing {
+                self.process_run(simd, Run { block, x0, columns, is_whole }, making);
+            }
+            x0 = next;
+        }
+    }
+
+    /// Returns which bins of the unit at column `x0` are made.
+    fn find_making(&self, x0: usize) -> Making {
+        let Some(kept) = self.kept else { return Making::All };
+        let columns = x0..x0 + kept.content.width_px();
+        if kept.content.any_changed(columns.clone(), self.rows.clone()) {
+            return Making::All;
+        }
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
-        let keeps = self.kept.filter(|kept| {
-            let columns = block * BLOCK..(block + 1) * BLOCK;
-            !is_needed(kept.units, kept.support_px, columns, self.rows.clone())
+        let has_fresh = self.bins.iter().zip(kept.bins).any(|(bin, is_kept)| {
+            let Some(bin) = bin.as_ref().filter(|_| !is_kept) else { return false };
+            // At full scale, a cell has no pixels of its neighbours.
+            let (tile_columns, tile_rows) = match bin.scale {
+                1 => (columns.start / TILE_W..columns.end / TILE_W, self.rows.start / TILE_H..self.rows.end / TILE_H),
+                _ => self.tiles_around(columns.clone()),
+            };
+            let overlaps = |weight| self.tiles.any_overlapping(weight, tile_columns, tile_rows);
+            is_filled || bin.weight.as_ref().is_none_or(overlaps)
         });
+        if has_fresh { Making::Fresh } else { Making::Nothing }
+    }
+
+    /// Returns the columns and rows of tiles of some columns of the picture, and one more on every side, because the
+    /// averages of a cell include pixels of its neighbours.
+    fn tiles_around(&self, columns: Range<usize>) -> (Range<usize>, Range<usize>) {
+        (
+            (columns.start / TILE_W).saturating_sub(1)..columns.end.div_ceil(TILE_W) + 1,
+            (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1,
+        )
+    }
+
+    /// Adds some columns of a block to the bins.
+    #[inline(always)]
+    fn process_run<V: Simd>(&mut self, simd: V, run: Run, making: Making) {
+        let Run { block, x0, columns, .. } = run;
+        let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns.next_multiple_of(TILE_W));
+        let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
+        let kept_bins = self.kept.filter(|_| making == Making::Fresh).map_or([false; MAX_BINS], |kept| kept.bins);
         let mut active = [false; MAX_BINS];
         let mut support = 0;
         for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            if !is_filled && k >= self.first_pending[block] || keeps.is_some_and(|kept| kept.bins[k]) {
+            if !is_filled && k >= self.first_pending[block] || kept_bins[k] {
                 continue;
             }
             *active = is_filled
@@ -127,39 +186,33 @@ impl Band<'_> {
                     .is_none_or(|weight| self.tiles.any_overlapping(weight, tile_columns.clone(), tile_rows.clone()));
             match *active {
                 true => support = support.max(bin.scale as isize / 2),
-                false => bin.clear_block(block),
+                false => bin.clear(run),
             }
         }
-        // What is inpainted from a kept block may be of an earlier frame, too.
-        let is_read = matches!(self.inpainting, Inpainting::Pending { .. }) && keeps.is_none();
+        let is_read = matches!(self.inpainting, Inpainting::Pending { .. });
         if !active.contains(&true) && !is_read {
             return;
         }
         let mut surfaces: Surfaces<PADDED_BLOCK> = Surfaces::new();
-        let columns = block_columns(block, self.source.size.0);
+        let left = x0 as isize - MARGIN as isize;
         let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - support..last + support {
             let inside = y.clamp(0, height - 1) as usize;
             let ahead = (y + PREFETCH_ROWS).clamp(0, height - 1) as usize;
-            self.source.prefetch(ahead, (block * BLOCK) as isize - MARGIN as isize, columns + 2 * MARGIN);
-            self.source.unpack::<V, PADDED_BLOCK>(
-                inside,
-                (block * BLOCK) as isize - MARGIN as isize,
-                columns + 2 * MARGIN,
-                &mut surfaces,
-            );
+            self.source.prefetch(ahead, left, columns + 2 * MARGIN);
+            self.source.unpack::<V, PADDED_BLOCK>(inside, left, columns + 2 * MARGIN, &mut surfaces);
             match &mut self.inpainting {
                 Inpainting::NotNeeded => {}
                 Inpainting::Pending { halves, .. } => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add_row(block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
+                        halves.add_row(x0, MARGIN..MARGIN + columns, y as usize, &surfaces);
                     }
                 }
                 Inpainting::Done { background, .. } => {
                     let width = self.source.size.0;
-                    background.inpaint(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
+                    background.inpaint(simd, left, inside, width, &mut surfaces);
                 }
             }
             let mut range = (f32::INFINITY, f32::NEG_INFINITY);
@@ -171,10 +224,10 @@ impl Band<'_> {
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add_row::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    2 => bin.add_row::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    4 => bin.add_row::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, range),
-                    _ => bin.add_row::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    1 => bin.add_row::<V, 1>(simd, sums, run, first, y, &surfaces, range),
+                    2 => bin.add_row::<V, 2>(simd, sums, run, first, y, &surfaces, range),
+                    4 => bin.add_row::<V, 4>(simd, sums, run, first, y, &surfaces, range),
+                    _ => bin.add_row::<V, 8>(simd, sums, run, first, y, &surfaces, range),
                 }
             }
         }

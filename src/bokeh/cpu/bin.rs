@@ -11,11 +11,22 @@ use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
 use super::tent::{
     MARGIN, Means, PADDED_BLOCK, PLANE_LEN, SUM_PLANES, VectorWeight, accumulate_row, downscale_row, is_zero,
 };
-use super::tiles::BLOCK;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{BinWeight, CELL, MIN_COVERAGE};
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{load, prefetch, store};
+
+/// Columns of the picture inside a block, made together.
+#[derive(Clone, Copy)]
+pub struct Run {
+    pub block: usize,
+    /// The first column: a whole strip of every bin.
+    pub x0: usize,
+    /// Rounded up to whole strips of every bin, also beyond the picture.
+    pub columns: usize,
+    /// Whether these are all columns of the block.
+    pub is_whole: bool,
+}
 
 /// Output of one bin for a band.
 pub struct BinRows<'a> {
@@ -75,19 +86,22 @@ fn strip_row_offset(across: usize, x: usize, row: usize) -> usize {
 }
 
 impl BinRows<'_> {
+    /// Removes all content of a run.
     #[inline(always)]
-    pub fn clear_block(&mut self, block: usize) {
-        let (x0, width) = (block * BLOCK / self.scale, BLOCK / self.scale);
+    pub fn clear(&mut self, run: Run) {
+        let (x0, width) = (run.x0 / self.scale, run.columns / self.scale);
         for row in 0..self.cell_row_count() {
-            let blocks = self.blocks();
-            if std::mem::take(&mut self.filled[row * blocks + block]) {
+            let filled = self.filled_mut(row, run);
+            let was_filled = *filled;
+            *filled &= !run.is_whole;
+            if was_filled {
                 let first = row * self.across + x0 / STRIP;
-                let count = (width / STRIP).min(self.across - x0 / STRIP);
+                let count = width.div_ceil(STRIP).min(self.across - x0 / STRIP);
                 self.out[first * STRIP_CELLS..][..count * STRIP_CELLS].fill(0.0);
             }
         }
         let across = self.size.0.div_ceil(CELL);
-        let (first, cells) = (x0 / CELL, (width / CELL).min(across.saturating_sub(x0 / CELL)));
+        let (first, cells) = (x0 / CELL, width.div_ceil(CELL).min(across.saturating_sub(x0 / CELL)));
         let total = self.cells.len() / (CELL_PLANES * self.cell_row_count());
         for (k, plane) in self.cells.chunks_exact_mut(total).enumerate() {
             plane[first..first + cells].fill(EMPTY_CELL[k % CELL_PLANES]);
@@ -111,8 +125,10 @@ impl BinRows<'_> {
         }
     }
 
-    fn blocks(&self) -> usize {
-        self.filled.len() / self.cell_row_count()
+    /// Returns whether the row of cells has any content in the block of a run.
+    fn filled_mut(&mut self, row_of_cells: usize, run: Run) -> &mut bool {
+        let blocks = self.filled.len() / self.cell_row_count();
+        &mut self.filled[row_of_cells * blocks + run.block]
     }
 
     fn cell_row_count(&self) -> usize {
@@ -126,7 +142,7 @@ impl BinRows<'_> {
         &mut self,
         simd: V,
         sums: &mut BinSums,
-        (block, columns): (usize, usize),
+        run: Run,
         first: isize,
         y: isize,
         surfaces: &Surfaces<PADDED_BLOCK>,
@@ -136,7 +152,7 @@ impl BinRows<'_> {
         let overlaps = self.weight.is_none_or(|weight| weight.overlaps(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
-                let row = (block, columns, (y - first) as usize);
+                let row = (run, (y - first) as usize);
                 self.begin_cell_row(row, sums);
                 match overlaps {
                     true => self.store_full_scale_row(simd, row, sums, surfaces),
@@ -165,7 +181,7 @@ impl BinRows<'_> {
                 simd,
                 &VectorWeight::new(simd, &self.weight),
                 surfaces,
-                columns,
+                run.columns,
                 [1.0 / S as f32 - rise, rise],
                 [above, below],
                 fresh,
@@ -177,9 +193,9 @@ impl BinRows<'_> {
                 sums.touched[1 - parity] = false;
             }
             if upper >= 0 {
-                let row = (block, columns, upper as usize);
+                let row = (run, upper as usize);
                 if touched {
-                    downscale_row::<V, S>(simd, above, columns, &mut sums.means);
+                    downscale_row::<V, S>(simd, above, run.columns, &mut sums.means);
                 }
                 self.begin_cell_row(row, sums);
                 match touched {
@@ -193,19 +209,21 @@ impl BinRows<'_> {
 
     /// Starts a row of cells if this is its first row.
     #[inline(always)]
-    fn begin_cell_row(&mut self, (block, _, row): (usize, usize, usize), sums: &mut BinSums) {
+    fn begin_cell_row(&mut self, (run, row): (Run, usize), sums: &mut BinSums) {
         if row.is_multiple_of(CELL) {
-            let blocks = self.blocks();
-            sums.stale = std::mem::take(&mut self.filled[row / CELL * blocks + block]);
+            let filled = self.filled_mut(row / CELL, run);
+            sums.stale = *filled;
+            // The rest of the block keeps its content.
+            *filled &= !run.is_whole;
         }
     }
 
     /// Clears a row without content in this bin.
     #[inline(always)]
-    fn clear_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &BinSums) {
-        let x0 = block * BLOCK / S;
+    fn clear_row<const S: usize>(&mut self, (run, row): (Run, usize), sums: &BinSums) {
+        let x0 = run.x0 / S;
         if sums.stale {
-            for x in (0..(columns / S).min(self.across * STRIP - x0)).step_by(STRIP) {
+            for x in (0..(run.columns / S).min(self.across * STRIP - x0)).step_by(STRIP) {
                 self.strip_row_mut(x0 + x, row).fill(0.0);
             }
         }
@@ -216,14 +234,14 @@ impl BinRows<'_> {
     fn store_full_scale_row<V: Simd>(
         &mut self,
         simd: V,
-        (block, columns, row): (usize, usize, usize),
+        (run, row): (Run, usize),
         sums: &mut BinSums,
         surfaces: &Surfaces<PADDED_BLOCK>,
     ) {
         let weight = VectorWeight::new(simd, &self.weight);
-        for x in (0..columns.min(self.across * STRIP - block * BLOCK)).step_by(V::F32_LANES) {
+        for x in (0..run.columns.min(self.across * STRIP - run.x0)).step_by(V::F32_LANES) {
             let taken = weight.surface_weights(simd, surfaces, MARGIN + x);
-            let out = self.strip_row_mut(block * BLOCK + x, row);
+            let out = self.strip_row_mut(run.x0 + x, row);
             if is_zero(simd, taken) {
                 if sums.stale {
                     for p in 0..4 {
@@ -234,11 +252,11 @@ impl BinRows<'_> {
             }
             let values = weight.apply(simd, taken, surfaces, MARGIN + x);
             // The strips of the next rows are far away in memory.
-            let ahead = &self.strip_row_mut(block * BLOCK + x, (row + PREFETCH_ROWS).min(self.rows - 1))[x % STRIP..];
+            let ahead = &self.strip_row_mut(run.x0 + x, (row + PREFETCH_ROWS).min(self.rows - 1))[x % STRIP..];
             for p in 0..4 {
                 prefetch(&ahead[p * STRIP..][..V::F32_LANES]);
             }
-            let out = self.strip_row_mut(block * BLOCK + x, row);
+            let out = self.strip_row_mut(run.x0 + x, row);
             for p in 0..4 {
                 store::<V>(out, p * STRIP + x % STRIP, values[p]);
             }
@@ -262,16 +280,15 @@ impl BinRows<'_> {
             }
             accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
         }
-        let blocks = self.blocks();
-        self.filled[row / CELL * blocks + block] = true;
+        *self.filled_mut(row / CELL, run) = true;
     }
 
     /// Stores the row of cells after its last row.
     #[inline(always)]
-    fn end_cell_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &mut BinSums) {
+    fn end_cell_row<const S: usize>(&mut self, (run, row): (Run, usize), sums: &mut BinSums) {
         if row % CELL == CELL - 1 || row == self.rows - 1 {
-            let filled = self.filled[row / CELL * self.blocks() + block];
-            self.store_cells::<S>((block, columns), row / CELL, filled.then_some(&sums.cells));
+            let filled = *self.filled_mut(row / CELL, run);
+            self.store_cells::<S>(run, row / CELL, filled.then_some(&sums.cells));
             if filled {
                 clear_cells(&mut sums.cells);
             }
@@ -280,13 +297,8 @@ impl BinRows<'_> {
 
     /// Stores a row of the bin and adds it to its cells.
     #[inline(always)]
-    fn store_row<V: Simd, const S: usize>(
-        &mut self,
-        simd: V,
-        (block, columns, row): (usize, usize, usize),
-        sums: &mut BinSums,
-    ) {
-        let (x0, width) = (block * BLOCK / S, columns / S);
+    fn store_row<V: Simd, const S: usize>(&mut self, simd: V, (run, row): (Run, usize), sums: &mut BinSums) {
+        let (x0, width) = (run.x0 / S, run.columns / S);
         let means = &sums.means.0;
         for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
             let out = &mut self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
@@ -295,8 +307,7 @@ impl BinRows<'_> {
             }
             prefetch(self.strip_row_mut(x0 + x, (row + 1).min(self.rows - 1)));
         }
-        let blocks = self.blocks();
-        self.filled[row / CELL * blocks + block] = true;
+        *self.filled_mut(row / CELL, run) = true;
         let (floor, one) = (simd.splat_f32s(MIN_COVERAGE), simd.splat_f32s(1.0));
         for x in (0..width).step_by(V::F32_LANES) {
             let coverage = load::<V>(&means[3], x);
@@ -315,9 +326,9 @@ impl BinRows<'_> {
     }
 
     #[inline(always)]
-    fn store_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: Option<&CellSums>) {
+    fn store_cells<const S: usize>(&mut self, run: Run, row: usize, cells: Option<&CellSums>) {
         let across = self.cells.len() / (CELL_PLANES * self.cell_row_count());
-        let (x0, width) = (block * BLOCK / S, columns / S);
+        let (x0, width) = (run.x0 / S, run.columns / S);
         let valid = width.min(self.size.0.saturating_sub(x0));
         for p in 0..if self.needs_color_range { CELL_PLANES } else { 2 } {
             let out = &mut self.cells[(row * CELL_PLANES + p) * across + x0 / CELL..];

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use super::encode::CHUNK;
 use super::pixels::{Pixels, Radii};
 use super::survey::SurveyRow;
-use super::tiles::TILE_H;
+use super::tiles::{TILE_H, TILE_W};
 use super::unpack::InputFrame;
 use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
@@ -81,7 +81,7 @@ impl Held {
         }
         let Self { detector, picture, is_complete, taken: [first, second, ..], size, .. } = self;
         Some(HeldRows {
-            units: some_kept.then_some(detector.units()),
+            units: some_kept.then_some(detector.results()),
             picture: DisjointParts::new(picture, size.0 * TILE_H * 3, first),
             is_complete: DisjointParts::new(is_complete, size.0.div_ceil(CHUNK), second),
         })
@@ -92,20 +92,6 @@ impl Held {
         self.detector.clear();
         self.is_complete.fill(false);
     }
-}
-
-/// Returns how far around a result, in pixels of the picture, the kept bins are read for it. The coarse grid is read from
-/// farther, but only for radii and colour ranges, which hardly depend on single frames.
-pub fn support_px(plan: &Plan) -> usize {
-    let kept = plan.bins.iter().filter(|bin| is_kept(bin));
-    kept.map(|bin| (plan.bin_half_width(bin) + 1) * bin.scale).max().unwrap_or(0)
-}
-
-/// Whether any unit within `support_px` of these columns and rows must be made anew.
-#[inline(always)]
-pub fn is_needed(units: &Units, support_px: usize, columns: Range<usize>, rows: Range<usize>) -> bool {
-    let around = |range: Range<usize>| range.start.saturating_sub(support_px)..range.end + support_px;
-    units.any_changed(around(columns), around(rows))
 }
 
 impl CpuBokeh {
@@ -130,7 +116,19 @@ impl CpuBokeh {
             return false;
         }
         self.survey(frame, held, follows_depth);
-        self.arch.dispatch(|| held.detector.detect(&self.plan))
+        let is_beside_fresh = |columns: Range<usize>, rows: Range<usize>| {
+            let [fresh, kept] = [false, true].map(|kept| self.has_content(kept, &columns, &rows));
+            fresh && kept
+        };
+        self.arch.dispatch(|| held.detector.detect(&self.plan, is_beside_fresh))
+    }
+
+    /// Whether any bin that may be kept, or that may not, has content in some columns and rows.
+    fn has_content(&self, kept: bool, columns: &Range<usize>, rows: &Range<usize>) -> bool {
+        let columns = columns.start / TILE_W..columns.end.div_ceil(TILE_W);
+        let rows = rows.start / TILE_H..rows.end.div_ceil(TILE_H);
+        let mut bins = self.plan.bins.iter().enumerate().filter(|(_, bin)| is_kept(bin) == kept);
+        bins.any(|(k, _)| self.tiles.any_overlapping(&self.plan.bin_weight(k), columns.clone(), rows.clone()))
     }
 
     fn survey(&mut self, frame: &InputFrame<'_>, held: &mut Held, follows_depth: bool) {

@@ -33,7 +33,7 @@ use band::{Band, BandSums, Inpainting, Kept, Layer, NO_BIN};
 use bin_parts::{BinParts, StripParts};
 use blur::{Scratch, Strip};
 use gather::Gather;
-use held::{Held, HeldRows, support_px};
+use held::{Held, HeldRows};
 use marking::MarkSilhouettes;
 use pulp::Arch;
 use reach::DilateRadii;
@@ -46,13 +46,15 @@ use super::BlurredFrame;
 use super::ladder::Compositing;
 use super::occlusion::MAX_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
-use super::quality_level::SCALES;
-use super::reuse::{Units, is_kept};
+use super::reuse::{CONTENT_BIN_W, Units, content_rows, is_kept};
 use crate::budget::Quality;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool, core_count};
 
 pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compression_factor, expansion_factor};
+
+// Content is kept in whole strips.
+const _: () = assert!(CONTENT_BIN_W == rows::STRIP);
 
 /// Runs a plan on the CPU.
 pub struct CpuBokeh {
@@ -151,20 +153,21 @@ impl CpuBokeh {
         let mut units = None;
         if let Some(held) = &mut held {
             if self.find_kept(&frame, held) {
-                units = Some(held.detector.units());
+                units = Some((held.detector.content(), held.detector.results()));
             }
             lap("survey")?;
         }
-        self.kept_fraction = units.map_or(0.0, Units::kept_fraction);
+        self.kept_fraction = units.map_or(0.0, |(_, results)| results.kept_fraction());
+        let (content, results) = units.unzip();
         // If something is in front, blocks where it occludes anything get the bins behind it after the inpainting.
-        self.compute_bins(&frame, None, units);
+        self.compute_bins(&frame, None, content);
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
                 pyramid.fill(&self.plan.visible_weight(layer.start), &self.silhouettes, &mut self.workers, self.arch);
             }
             lap("fill")?;
-            self.compute_bins(&frame, Some(layer), units);
+            self.compute_bins(&frame, Some(layer), content);
             lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
@@ -175,7 +178,7 @@ impl CpuBokeh {
         } else {
             self.dilate_radii();
             lap("reach")?;
-            self.blur_bins(units);
+            self.blur_bins(results);
             lap("blur")?;
         }
         let kept = self.kept_fraction > 0.0;
@@ -238,12 +241,10 @@ impl CpuBokeh {
     }
 
     /// Pass `bin`: all bins, or those of a `layer` in the blocks that waited for its inpainting.
-    fn compute_bins(&mut self, frame: &InputFrame<'_>, layer: Option<Range<usize>>, units: Option<&Units>) {
+    fn compute_bins(&mut self, frame: &InputFrame<'_>, layer: Option<Range<usize>>, content: Option<&Units>) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
-        // Bands of at least 32 rows, because each reads some rows of its neighbours again.
-        let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2]);
-        let rows = CELL * coarsest;
+        let rows = content_rows(plan);
         let mut bin_parts: [Option<BinParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in_slot(slot.index) else { continue };
@@ -261,7 +262,7 @@ impl CpuBokeh {
             (*layer, count) = (layer_from(range.start), count + 1);
         }
         let layers = &layers[..count];
-        let (support_px, kept_bins) = (support_px(plan), plan.kept_bins());
+        let kept = content.map(|content| Kept { content, bins: plan.kept_bins() });
         let (halves, filled) = match (&mut self.pyramid, layer) {
             (Some(pyramid), Some(Range { start: first, .. })) => {
                 (None, Some((first, pyramid.background(&self.silhouettes, plan, first))))
@@ -281,7 +282,7 @@ impl CpuBokeh {
                 rows: band * rows..(band + 1) * rows,
                 bins: std::array::from_fn(|k| bin_parts[k].as_ref().map(|bin_part| bin_part.part(band))),
                 inpainting,
-                kept: units.map(|units| Kept { units, support_px, bins: kept_bins }),
+                kept,
                 first_pending: first_pending.part(band),
                 sums: &mut thread.sums,
             });

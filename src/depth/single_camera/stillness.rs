@@ -47,7 +47,7 @@ impl StillnessDetector {
         let (across, down) = (self.prediction.means.across, self.prediction.means.down);
         self.prediction.find_changed(0..down, across, &mut changed);
         if changed[0] {
-            self.prediction.refer_to_all();
+            self.prediction.make_all();
         }
         self.skipped = Some(if changed[0] { 0 } else { self.skipped.unwrap_or(0) + 1 });
         !changed[0]
