@@ -10,7 +10,7 @@ pub const TILE: usize = 8;
 /// Means per tile: light of red, green and blue (squared codes, near linear light), and CoC in pixels.
 pub const MEANS: usize = 4;
 /// Change of luma and of chroma that counts, in codes of Y'CbCr, where the sensor has no noise.
-const BOUND: [f32; 2] = [1.0, 1.5];
+const BOUND: [f32; 2] = [0.6, 1.0];
 /// Largest bound on a noisy sensor.
 const MAX_BOUND: [f32; 2] = [2.5, 4.0];
 /// A change that counts exceeds the noise this many standard deviations.
@@ -21,14 +21,14 @@ const QUARTILE: f32 = 0.3186;
 /// Differences, in the same units, of the held content from that of which a result was made that count, and the fraction
 /// of the bound of the CoC. Most of the content stays, so it has less noise; and while content that differs from its
 /// neighbours is blurred, results that do would show a seam.
-const RESULT_BOUND: [f32; 2] = [0.5, 0.8];
+const RESULT_BOUND: [f32; 2] = [0.4, 0.7];
 const RESULT_COC_BOUND: f32 = 0.6;
 /// Change of the CoC that counts, as a fraction of the smallest kept radius, and at least in pixels.
 const COC_BOUND: (f32, f32) = (0.015, 0.1);
 /// Fraction of the difference by which the known noise follows the measured one, upwards and downwards.
 const NOISE_RISE: f32 = 1.0 / 16.0;
 const NOISE_FALL: f32 = 1.0 / 4.0;
-/// Buckets of the histogram of changes, and changes per code.
+/// Buckets of each half of the histogram of changes, and buckets per code.
 const BUCKETS: usize = 128;
 const BUCKETS_PER_CODE: f32 = 32.0;
 /// Largest side of the square that is averaged, in pixels.
@@ -151,23 +151,33 @@ impl Prediction {
         self.bounds[3] = (COC_BOUND.0 * radius_px).max(COC_BOUND.1);
     }
 
-    /// Measures the noise by the quietest quarter of the tiles: what moves is not among them.
+    /// Measures the noise by the quarter of the tiles that differs least from the median change: what moves is not among
+    /// them, and a change of the light is no noise.
     fn measure_noise(&mut self) {
         for (k, planes) in [0..1, 1..3].into_iter().enumerate() {
-            let mut counts = [0usize; BUCKETS];
+            let mut counts = [0usize; 2 * BUCKETS];
             let mut total = 0;
             for plane in planes {
                 for (now, before) in self.now.planes[plane].iter().zip(&self.before.planes[plane]) {
-                    counts[(((now - before).abs() * BUCKETS_PER_CODE) as usize).min(BUCKETS - 1)] += 1;
+                    let bucket = (now - before) * BUCKETS_PER_CODE + BUCKETS as f32;
+                    counts[bucket.clamp(0.0, (2 * BUCKETS - 1) as f32) as usize] += 1;
                     total += 1;
                 }
             }
             let mut below = 0;
-            let quartile = counts.iter().position(|&count| {
+            let median = counts.iter().position(|&count| {
                 below += count;
-                below * QUARTER >= total
+                2 * below >= total
             });
-            let noise = (quartile.unwrap_or(0) as f32 + 0.5) / BUCKETS_PER_CODE / QUARTILE;
+            let median = median.unwrap_or(BUCKETS);
+            let mut within = counts[median];
+            let quartile = (1..BUCKETS).find(|&distance| {
+                let is_enough = within * QUARTER >= total;
+                let beside = [median.checked_sub(distance), Some(median + distance)];
+                within += beside.into_iter().flatten().filter_map(|bucket| counts.get(bucket)).sum::<usize>();
+                is_enough
+            });
+            let noise = (quartile.unwrap_or(BUCKETS) as f32 - 0.5) / BUCKETS_PER_CODE / QUARTILE;
             let follow = match self.noise[k] {
                 0.0 => 1.0,
                 known if noise < known => NOISE_FALL,

@@ -76,12 +76,12 @@ fn a_still_scene_is_kept_and_stays_the_same_to_the_bit() {
         let mut both = Both::new(kind, 2);
         let (picture, map) = scene(200, 0.0, |_, _| 0.0);
         let first = both.blur(&picture, &map);
-        assert_eq!((first.fraction, &first.kept), (0.0, &first.fresh), "{kind:?}");
+        assert!(first.fraction == 0.0 && first.kept == first.fresh, "{kind:?}");
         let mut renewed = 0;
         for frame in 1..200 {
             let next = both.blur(&picture, &map);
             assert!(next.fraction > 0.7, "{kind:?} {frame}: {}", next.fraction);
-            assert_eq!(next.kept, first.fresh, "{kind:?} {frame}");
+            assert!(next.kept == first.fresh, "{kind:?} {frame}");
             renewed += u32::from(next.fraction < 1.0);
         }
         assert!(renewed > 0, "{kind:?}: everything is made anew at times");
@@ -101,7 +101,7 @@ fn noise_is_kept_out_of_the_background_and_the_subject_is_fresh() {
         let subject = |image: &ColorImage| -> Vec<u8> {
             (150..250).flat_map(|y| image.rgb[(y * 512 + 230) * 3..(y * 512 + 270) * 3].to_vec()).collect()
         };
-        assert_eq!(subject(&pair.kept), subject(&picture), "{frame}: what is in focus is the camera's");
+        assert!(subject(&pair.kept) == subject(&picture), "{frame}: what is in focus is the camera's");
         if let Some(before) = &before
             && frame > 40
         {
@@ -153,12 +153,15 @@ fn another_scene_focus_or_nearer_object_is_made_anew() {
         [("cut", &other, &other_map), ("back", &picture, &map), ("near", &picture, &near), ("gone", &picture, &map)]
     {
         let pair = both.blur(picture, map);
-        assert_eq!((pair.fraction, &pair.kept), (0.0, &pair.fresh), "{name}");
-        if name != "near" {
-            for _ in 0..6 {
-                let pair = both.blur(picture, map);
-                assert_eq!(pair.kept, pair.fresh, "{name}");
-            }
+        if name == "gone" {
+            // The rest of the room may stay.
+            assert!(codes_apart(&pair.kept, &pair.fresh) <= 1, "{name}");
+            continue;
+        }
+        assert!(pair.fraction == 0.0 && pair.kept == pair.fresh, "{name}: {}", pair.fraction);
+        for _ in 0..6 {
+            let pair = both.blur(picture, map);
+            assert!(codes_apart(&pair.kept, &pair.fresh) <= u8::from(name == "near"), "{name}");
         }
     }
     let CocField::Depth(lens) = DOF else { unreachable!() };
@@ -175,7 +178,7 @@ fn the_same_frames_give_the_same_pictures_on_any_number_of_threads() {
     for frame in 0..40u32 {
         let (picture, map) = scene(60 + 3 * (frame / 10), 0.0, sensor(frame, 4.0));
         let [one, two, three] = executors.each_mut().map(|both| both.blur(&picture, &map));
-        assert_eq!((&one.kept, one.fraction), (&two.kept, two.fraction), "{frame}");
-        assert_eq!((&one.kept, one.fraction), (&three.kept, three.fraction), "{frame}");
+        assert!(one.kept == two.kept && one.fraction == two.fraction, "{frame}");
+        assert!(one.kept == three.kept && one.fraction == three.fraction, "{frame}");
     }
 }
