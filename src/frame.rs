@@ -228,6 +228,14 @@ impl DepthMap {
         resize_buffer(&mut self.metres, width as usize * height as usize);
     }
 
+    /// Copies size and content of another map, reusing its own memory if possible.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.resize(other.width, other.height);
+        self.metres.copy_from_slice(&other.metres);
+        self.matte.pixels.clone_from(&other.matte.pixels);
+        (self.subject_m, self.person_m, self.is_smooth) = (other.subject_m, other.person_m, other.is_smooth);
+    }
+
     /// Returns columns and rows.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)

@@ -17,12 +17,8 @@ pub(crate) struct OriginalFrame {
 impl OriginalFrame {
     /// Copies a frame before it is changed.
     pub fn copy_from(&mut self, color: &ColorImage, map: &DepthMap) {
-        self.color.resize(color.width, color.height);
-        self.color.rgb.copy_from_slice(&color.rgb);
-        self.map.resize(map.width, map.height);
-        self.map.metres.copy_from_slice(&map.metres);
-        self.map.matte.pixels.clone_from(&map.matte.pixels);
-        (self.map.subject_m, self.map.is_smooth) = (map.subject_m, map.is_smooth);
+        self.color.copy_from(color);
+        self.map.copy_from(map);
     }
 
     /// Swaps the original back into a frame.

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};
 
 use super::{Change, ChangeSender, OutputRequest, Progress, View};
-use crate::bokeh::{self, Bokeh, BokehError};
+use crate::bokeh::{self, Backend, Bokeh, BokehError};
 use crate::capture::Camera;
 use crate::clock::Clock;
 use crate::computing::ComputeOptions;
@@ -12,7 +12,7 @@ use crate::depth::DepthSource;
 use crate::engine::{Blur, Engine, Input, Origin, TimeBudget};
 use crate::link::Sender;
 use crate::link::demand::Demand;
-use crate::look::Look;
+use crate::look::{Look, Reuse};
 use crate::names::named;
 use crate::sink::Sink;
 
@@ -50,6 +50,11 @@ impl BlurSetup {
         make: impl FnOnce(&bokeh::Settings) -> Result<Box<dyn Bokeh>, E>,
     ) -> Result<(Self, ChangeSender), E> {
         let bokeh = look.blur_settings(size, adaptive).as_ref().map(make).transpose()?;
+        if look.reuse == Reuse::On && bokeh.as_ref().is_some_and(|bokeh| bokeh.backend() != Backend::Cpu) {
+            tracing::warn!(
+                "without effect here: --reuse on (the GPU blurs all of every frame; --backend cpu keeps parts)"
+            );
+        }
         let (changes, to_come) = ChangeSender::new(look.clone(), size, adaptive);
         Ok((Self { look, bokeh, adaptive, changes: Some(to_come) }, changes))
     }

@@ -53,6 +53,8 @@ pub struct SingleCamera {
     subject_mask: SubjectMask,
     upsampler: NearnessUpsampler,
     matting: MaskMatting,
+    /// The map of the first of several still pictures, for the others; `None` while anything moves.
+    held: Option<Box<DepthMap>>,
     /// Index into [`DEPTH_INTERVALS`].
     effort: usize,
     /// Whether frames arrive in real time; if not, the results must not depend on this machine's speed.
@@ -99,6 +101,7 @@ impl SingleCamera {
             subject_mask: SubjectMask::default(),
             upsampler: NearnessUpsampler::default(),
             matting: MaskMatting::default(),
+            held: None,
             effort: DEPTH_INTERVALS.len() - 1,
             is_live: false,
             frames: 0,
@@ -187,7 +190,7 @@ impl DepthSource for SingleCamera {
     fn read(&mut self, FrameInput { stamp, color, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.schedule_networks(stamp.time_ns);
         self.run_person_network(color, stamp.time_ns);
-        let Self { name, person, absence, relative_depth, subject_mask, upsampler, matting, due, .. } = self;
+        let Self { name, person, absence, relative_depth, subject_mask, upsampler, matting, held, due, .. } = self;
         let mask = person.as_ref().map(PersonSegmenter::mask);
         if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
             tracing::warn!(
@@ -195,6 +198,13 @@ impl DepthSource for SingleCamera {
                             blurred",
                 Absence::MIN_REPORTED_NS / 1_000_000_000
             );
+        }
+        // Only the mask and the picture decide, so that the map of a still picture serves for the next.
+        let is_still = relative_depth.is_none() && person.as_ref().is_some_and(PersonSegmenter::is_still);
+        held.take_if(|held| !is_still || held.size() != color.size());
+        if let Some(held) = held {
+            map.copy_from(held);
+            return Ok(());
         }
         run_depth_network(relative_depth, (name, *due), color, mask);
         if let (Some(mask), Some(relative_depth)) = (mask, &relative_depth) {
@@ -217,6 +227,9 @@ impl DepthSource for SingleCamera {
         if let Some(person) = &person {
             let mask = if relative_depth.is_some() { subject_mask.mask() } else { person.mask() };
             matting.compute_matte(mask, color, None, map);
+        }
+        if is_still {
+            *held = Some(Box::new(map.clone()));
         }
         Ok(())
     }

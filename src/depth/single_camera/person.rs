@@ -19,6 +19,8 @@ pub struct PersonSegmenter {
     is_logits: bool,
     /// When the previous picture was taken.
     seen_ns: Option<u64>,
+    /// Whether the mask is that of an earlier picture, from which the last one hardly differs.
+    is_still: bool,
 }
 
 impl PersonSegmenter {
@@ -30,6 +32,7 @@ impl PersonSegmenter {
             mask: Mask::default(),
             is_logits: false,
             seen_ns: None,
+            is_still: false,
         }
     }
 
@@ -45,6 +48,11 @@ impl PersonSegmenter {
         self.picture_network.set_reuse(on);
     }
 
+    /// Returns whether the mask of an earlier picture served for the last one.
+    pub fn is_still(&self) -> bool {
+        self.is_still
+    }
+
     /// Returns the mask of the last picture.
     pub fn mask(&self) -> &Mask {
         &self.mask
@@ -57,7 +65,8 @@ impl PersonSegmenter {
     /// See [`PictureNetwork::infer`].
     pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
         self.picture_network.set_picture(color);
-        if self.picture_network.is_still() {
+        self.is_still = self.picture_network.is_still();
+        if self.is_still {
             return Ok(());
         }
         let output = self.picture_network.run()?;

@@ -113,6 +113,10 @@ const NEEDS: &[Requirement] = &[
         (_, DepthOrigin::Plate) => Some("the plate already shows the background"),
         _ => needs_dof(run),
     }),
+    (&["reuse"], |run| match run.source {
+        FrameOrigin::Picture | FrameOrigin::Bench => Some("every single picture is blurred from scratch"),
+        FrameOrigin::Source(_) => needs_blur(run),
+    }),
     (&["behind"], |run| if run.source == FrameOrigin::Bench { Some("the scene has its own") } else { needs_dof(run) }),
     (&["follow"], |run| match run.source {
         FrameOrigin::Picture | FrameOrigin::Bench => Some("a single picture is always shown whole"),
