@@ -236,5 +236,5 @@ impl Band<'_> {
 
 /// Returns the columns of a block inside the picture, rounded up to whole vectors of the coarsest bin.
 fn block_columns(block: usize, width: usize) -> usize {
-    (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
+    (width - block * BLOCK).next_multiple_of(BLOCK / 2).min(BLOCK)
 }

@@ -3,11 +3,13 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::tiles::{BLOCK, TILE_W};
+use super::tiles::BLOCK;
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::prefetch;
 
+/// Rows of buffers are padded to a multiple of this number of values.
+const ROW_PADDING: usize = 64;
 /// Columns of a strip: the output of one part of the blur pass.
 pub const STRIP: usize = 32;
 
@@ -23,7 +25,7 @@ pub struct PlanarRows<const CH: usize> {
 impl<const CH: usize> PlanarRows<CH> {
     /// Allocates zeros, with `width` rounded up to whole tiles.
     pub fn new(width: usize, height: usize, pad: usize) -> Self {
-        let stride = width.next_multiple_of(TILE_W) + 2 * pad;
+        let stride = width.next_multiple_of(ROW_PADDING) + 2 * pad;
         Self { data: Aligned::zeros(stride * CH * height), stride, pad }
     }
 
@@ -75,7 +77,7 @@ impl CellGrid {
 
     /// Empties the grid and resizes it.
     pub fn reshape(&mut self, width: usize, height: usize) {
-        (self.width, self.height) = (width.next_multiple_of(TILE_W) / CELL, height.div_ceil(CELL));
+        (self.width, self.height) = (width.next_multiple_of(ROW_PADDING) / CELL, height.div_ceil(CELL));
         self.data.clear();
         let planes = (0..self.height).flat_map(|_| EMPTY_CELL);
         planes.for_each(|value| self.data.extend(std::iter::repeat_n(value, self.width)));

@@ -6,9 +6,9 @@ use crate::bokeh::plan::BinWeight;
 use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
-pub const TILE_W: usize = 64;
+pub const TILE_W: usize = 32;
 /// Columns of the picture per block.
-pub const BLOCK: usize = 4 * TILE_W;
+pub const BLOCK: usize = 8 * TILE_W;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// Neighbourhood that can change a tile, in tiles: the widest filter at full scale of the bin in focus, and the cells
