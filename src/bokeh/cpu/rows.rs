@@ -23,7 +23,7 @@ pub struct PlanarRows<const CH: usize> {
 }
 
 impl<const CH: usize> PlanarRows<CH> {
-    /// Allocates zeros, with `width` rounded up to whole tiles.
+    /// Allocates zeros, with padded rows.
     pub fn new(width: usize, height: usize, pad: usize) -> Self {
         let stride = width.next_multiple_of(ROW_PADDING) + 2 * pad;
         Self { data: Aligned::zeros(stride * CH * height), stride, pad }
@@ -68,7 +68,7 @@ pub const CELL_PLANES: usize = 8;
 pub const EMPTY_CELL: [f32; CELL_PLANES] = [0.0, 0.0, NO_COLOR, NO_COLOR, NO_COLOR, -NO_COLOR, -NO_COLOR, -NO_COLOR];
 
 impl CellGrid {
-    /// Creates an empty grid over `width` x `height` bin pixels (`width` in whole tiles).
+    /// Creates an empty grid over `width` x `height` bin pixels (rows are padded).
     pub fn new(width: usize, height: usize) -> Self {
         let mut cells = Self { data: Vec::new(), width: 0, height: 0 };
         cells.reshape(width, height);
