@@ -8,6 +8,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums, Run};
+use super::encode::CHUNK;
 use super::fill::{HalfPictureBand, InpaintedBackground};
 use super::tent::{MARGIN, PADDED_BLOCK};
 use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, extend_range};
@@ -145,10 +146,11 @@ impl Band<'_> {
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
         let has_fresh = self.bins.iter().zip(kept.bins).any(|(bin, is_kept)| {
             let Some(bin) = bin.as_ref().filter(|_| !is_kept) else { return false };
-            // At full scale, a cell has no pixels of its neighbours.
+            // At full scale, no pixels of neighbours count; but the composite reads whole chunks.
+            let chunks = columns.start - columns.start % CHUNK..columns.end.next_multiple_of(CHUNK);
             let (tile_columns, tile_rows) = match bin.scale {
-                1 => (columns.start / TILE_W..columns.end / TILE_W, self.rows.start / TILE_H..self.rows.end / TILE_H),
-                _ => self.tiles_around(columns.clone()),
+                1 => (chunks.start / TILE_W..chunks.end / TILE_W, self.rows.start / TILE_H..self.rows.end / TILE_H),
+                _ => self.tiles_around(chunks),
             };
             let overlaps = |weight| self.tiles.any_overlapping(weight, tile_columns, tile_rows);
             is_filled || bin.weight.as_ref().is_none_or(overlaps)

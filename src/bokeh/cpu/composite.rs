@@ -64,7 +64,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
             if self.show_held(out, x0, take, still) {
                 continue;
             }
-            let may_be_near = layered && self.silhouettes.may_be_near(rows.clone(), x0);
+            let may_be_near = layered && self.silhouettes.may_be_near(x0..x0 + CHUNK, rows.clone());
             if x0 + CHUNK < width {
                 self.prefetch(x0 + CHUNK, rows.len());
             }

@@ -116,9 +116,11 @@ impl CpuBokeh {
             return false;
         }
         self.survey(frame, held, follows_depth);
+        let has_hidden = self.plan.layers().nth(1).is_some();
         let is_beside_fresh = |columns: Range<usize>, rows: Range<usize>| {
-            let [fresh, kept] = [false, true].map(|kept| self.has_content(kept, &columns, &rows));
-            fresh && kept
+            // The background that is inpainted past a silhouette moves with it.
+            let is_inpainted = || has_hidden && self.silhouettes.may_be_near(columns.clone(), rows.clone());
+            [false, true].iter().all(|kept| self.has_content(*kept, &columns, &rows)) || is_inpainted()
         };
         self.arch.dispatch(|| held.detector.detect(&self.plan, is_beside_fresh))
     }

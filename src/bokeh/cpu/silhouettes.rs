@@ -96,13 +96,14 @@ impl Silhouettes {
         });
     }
 
-    /// Whether any pixel of a chunk of some rows, from column `x0` on, may be within the radius of a silhouette. If
-    /// not, [`Self::proximity`] is `None` in all of them.
+    /// Whether any pixel of some columns and rows may be within the radius of a silhouette. If not,
+    /// [`Self::proximity`] is `None` in all of them.
     #[inline(always)]
-    pub fn may_be_near(&self, rows: Range<usize>, x0: usize) -> bool {
+    pub fn may_be_near(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
         let mut rows =
             (rows.start / SILHOUETTE_CELL).saturating_sub(1)..(rows.end.div_ceil(SILHOUETTE_CELL) + 1).min(self.down);
-        let columns = (x0 / SILHOUETTE_CELL).saturating_sub(1)..((x0 + CHUNK) / SILHOUETTE_CELL + 1).min(self.across);
+        let columns =
+            (columns.start / SILHOUETTE_CELL).saturating_sub(1)..(columns.end / SILHOUETTE_CELL + 1).min(self.across);
         rows.any(|row| {
             let line = &self.dilated[row * DISTANCES_PER_CELL * self.across..][..self.across];
             line[columns.clone()].iter().any(|&square| square > 0.0)

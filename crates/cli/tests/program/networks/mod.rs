@@ -139,6 +139,33 @@ fn each_frame_has_a_mask_of_its_own_at_every_effort() {
     assert!(alone.is_reusable(), "what is near and far is no mask");
 }
 
+/// With reuse, pictures that hardly differ share a map, and a change of the picture is followed at once.
+#[test]
+fn still_pictures_share_a_map_and_moved_ones_do_not() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    let (mut reusing, mut fresh) = (camera(&person, Runtime::BuiltIn), camera(&person, Runtime::BuiltIn));
+    reusing.set_reuse(true);
+    let mut frame = 0;
+    let mut read_both = |x: f32, flicker: u8| {
+        let (mut color, _) = disc(320, 240, (x, 118.0), 60.0);
+        frame += 1;
+        // Sensor noise of one code, another in every frame.
+        for (at, code) in color.rgb.iter_mut().enumerate().filter(|(at, _)| (at + frame as usize).is_multiple_of(7)) {
+            *code = code.saturating_add(flicker * u8::from(at % 2 == 0));
+        }
+        (read(&mut reusing, &color, frame), read(&mut fresh, &color, frame))
+    };
+    let still: Vec<(DepthMap, DepthMap)> = (0..12).map(|_| read_both(160.0, 1)).collect();
+    assert!(still[2..].iter().all(|(reused, _)| *reused == still[2].0), "one map for all");
+    assert!(still[2..].iter().any(|(_, fresh)| *fresh != still[2].1), "noise changes the fresh ones");
+    for step in 1..8 {
+        let (reused, fresh) = read_both(160.0 + 2.0 * step as f32, 1);
+        let apart = reused.metres.iter().zip(&fresh.metres).filter(|(a, b)| a != b).count();
+        assert!(apart < 40, "step {step}: {apart} pixels of an outline of 380");
+    }
+}
+
 #[test]
 fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
     let folder = TempDir::new().unwrap();
