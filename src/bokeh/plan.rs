@@ -18,7 +18,7 @@ use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
 use super::quality_level::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
-use super::reuse::is_kept;
+use super::reuse::{MIN_KEPT_RADIUS_PX, is_kept};
 use super::split::{CocHistogram, CocRange, MAX_RANGES};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -218,7 +218,7 @@ impl Plan {
         let [far, near] = &mut self.ranges;
         let [new_far, new_near] = &mut self.new_ranges;
         std::mem::swap(near, new_near);
-        if far != new_far && !(self.reuse && self.histogram.still_fits(false, far, new_far)) {
+        if far != new_far && !(self.reuse && self.histogram.refit(false, far, new_far, MIN_KEPT_RADIUS_PX)) {
             std::mem::swap(far, new_far);
             self.generation += 1;
         }
