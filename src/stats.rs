@@ -8,6 +8,7 @@ mod histogram;
 mod output_counts;
 mod quality_counts;
 mod report;
+mod summary;
 
 pub use frame_counter::{DropCause, DropCounts, FrameCounter, FrameCounts, FrameTicket};
 pub use frame_rate::FrameRateMeter;

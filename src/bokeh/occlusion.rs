@@ -6,7 +6,8 @@
 
 use std::ops::Range;
 
-use super::plan::{BinWeight, CROSS_FADE, Plan};
+use super::plan::{BinWeight, Plan};
+use super::split::CROSS_FADE;
 
 /// Largest number of layers of near bins; each is inpainted separately, which takes time.
 const MAX_NEAR_LAYERS: usize = 2;

@@ -17,9 +17,9 @@ use std::sync::Arc;
 use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
-use super::quality_level::{FOCUS_BORDER_PX, MAX_FULL_RADIUS_PX, QualityLevel, scale_within};
+use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, compensated_radius_px, scale_within};
 use super::reuse::{MIN_KEPT_RADIUS_PX, is_kept};
-use super::split::{CocHistogram, CocRange, MAX_RANGES};
+use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
 use crate::frame::{DepthMap, Matte};
@@ -341,34 +341,6 @@ impl Plan {
         let at = self.bins[index].high_px;
         at.is_finite().then(|| (at, 1.0 / (2.0 * CROSS_FADE * at.abs())))
     }
-}
-
-/// Half the width of the cross-fade between two bins, as a fraction of the border's CoC.
-pub(super) const CROSS_FADE: f32 = 0.15;
-
-/// Splits the radii of a ramp into ranges of equal ratio, because the look of a blur depends on the ratio. Returns none
-/// if the largest radius is hardly above that of the bin in focus.
-fn geometric_ranges(max_px: f32, bins: u32) -> impl Iterator<Item = CocRange> {
-    let ratio = max_px / FOCUS_BORDER_PX;
-    let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
-    (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| CocRange {
-        border_px: border_px(k),
-        low_px: border_px(k),
-        high_px: border_px(k + 1),
-    })
-}
-
-/// Returns the radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
-///
-/// The tents down and up add (2 s^2 + 1) / 12 of variance each, per axis in pixels of the picture, and larger pixels
-/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. The added variance is subtracted from that of the disc.
-#[inline(always)]
-pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
-    if scale == 1 {
-        return coc_px;
-    }
-    let s = scale as f32;
-    (coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
 }
 
 #[cfg(test)]

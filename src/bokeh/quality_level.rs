@@ -121,3 +121,16 @@ impl QualityLevel {
         scale_within(radius_px, self.uniform_radius_px)
     }
 }
+
+/// Returns the radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
+///
+/// The tents down and up add (2 s^2 + 1) / 12 of variance each, per axis in pixels of the picture, and larger pixels
+/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. The added variance is subtracted from that of the disc.
+#[inline(always)]
+pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
+    if scale == 1 {
+        return coc_px;
+    }
+    let s = scale as f32;
+    (coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
+}

@@ -1,7 +1,6 @@
 //! Depth slicing by histogram: bin borders lie where few pixels are, so that a surface stays in one bin and two
 //! surfaces do not share one. A flat background then costs one bin, however wide the possible range.
 
-use super::plan::CROSS_FADE;
 use super::quality_level::{FOCUS_BORDER_PX, QualityLevel};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
@@ -21,6 +20,9 @@ const SAMPLES_ACROSS: usize = 320;
 const BIN_COST: f64 = 0.002;
 /// Fraction of a bin's pixels that may have a smaller radius than its scale is made for.
 const STRAY_FRACTION: f32 = 0.02;
+
+/// Half the width of the cross-fade between two bins, as a fraction of the border's CoC.
+pub const CROSS_FADE: f32 = 0.15;
 
 /// Kept ranges serve content up to this factor beyond their largest radius, and from this factor of their smallest on.
 const HIGH_TOLERANCE: f32 = 1.1;
@@ -210,6 +212,18 @@ pub const MAX_RANGES: usize = 6;
 fn variance_between(sums: &[[f64; 3]; BUCKETS + 1], from: usize, to: usize) -> f64 {
     let [fraction, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
     if fraction > 0.0 { (squares - sum * sum / fraction).max(0.0) } else { 0.0 }
+}
+
+/// Splits the radii of a ramp into ranges of equal ratio, because the look of a blur depends on the ratio. Returns none
+/// if the largest radius is hardly above that of the bin in focus.
+pub fn geometric_ranges(max_px: f32, bins: u32) -> impl Iterator<Item = CocRange> {
+    let ratio = max_px / FOCUS_BORDER_PX;
+    let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
+    (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| CocRange {
+        border_px: border_px(k),
+        low_px: border_px(k),
+        high_px: border_px(k + 1),
+    })
 }
 
 /// Returns the first bucket that does not begin below a radius, in pixels.

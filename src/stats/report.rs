@@ -1,6 +1,5 @@
 //! The report of a run: JSON for measurements, a few lines for people.
 
-use std::fmt;
 use std::io;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -240,50 +239,6 @@ impl Serialize for QualityStats {
         }
         map.serialize_entry("switches", &self.switches)?;
         map.end()
-    }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let FrameCounts { captured, delivered, dropped, in_flight } = &self.frames;
-        write!(f, "{delivered} of {captured} frames delivered in {:.2} s", self.elapsed_s)?;
-        if self.elapsed_s > 0.0 {
-            write!(f, " ({:.1} per second)", *delivered as f64 / self.elapsed_s)?;
-        }
-        for (cause, count) in dropped.by_cause().into_iter().chain([("in flight", *in_flight)]) {
-            if count > 0 {
-                write!(f, ", {count} {cause}")?;
-            }
-        }
-        if let Some(latency) = &self.latency_ms {
-            let Percentiles { p50, p95, p99, max } = latency;
-            write!(f, "\nlatency ms: p50 {p50:.1}, p95 {p95:.1}, p99 {p99:.1}, max {max:.1}")?;
-        }
-        for (name, StageMs { p50, p99 }) in self.stages_ms.0.iter().filter(|stage| !stage.0.contains('.')) {
-            write!(f, "\n{name} ms: p50 {p50:.1}, p99 {p99:.1}")?;
-            if name == "blur" {
-                write!(f, "; budget {:.1}, missed by {} frames ({})", self.budget_ms, self.misses, self.adapter)?;
-            }
-        }
-        if self.quality.switches > 0 {
-            let percent = |(level, fraction): &(&str, f64)| format!("{level} {:.0} %", 100.0 * fraction);
-            let percents: Vec<String> = self.quality.fractions.iter().map(percent).collect();
-            write!(f, "\nquality: {}; {} changes", percents.join(", "), self.quality.switches)?;
-        }
-        if self.depth_held > 0 {
-            write!(f, "\ndepth: {} frames reused that of an earlier frame, to save time", self.depth_held)?;
-        }
-        if self.blur_reused > 0.0 {
-            write!(
-                f,
-                "\nblur: {:.0} % of the pictures kept from earlier frames, as they hardly changed",
-                100.0 * self.blur_reused
-            )?;
-        }
-        // Only outputs that lost frames.
-        let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);
-        lossy.try_for_each(|output| write!(f, "\n{output}"))?;
-        self.pipewire.iter().try_for_each(|node| write!(f, "\n{node}"))
     }
 }
 

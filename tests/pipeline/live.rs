@@ -95,7 +95,6 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         bokeh: None,
         look: dof(),
         adaptive: false,
-        reuse: false,
         measured: false,
         threads: 1,
         changes: None,

@@ -7,11 +7,11 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::bin::{BinRows, BinSums, Run};
+use super::bin::{BinRows, BinSums};
 use super::encode::CHUNK;
 use super::fill::{HalfPictureBand, InpaintedBackground};
 use super::tent::{MARGIN, PADDED_BLOCK};
-use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, extend_range};
+use super::tiles::{BLOCK, Run, TILE_H, TILE_W, Tiles, extend_range};
 use super::unpack::{InputFrame, Surfaces};
 use crate::bokeh::plan::{BinWeight, CELL, MAX_BINS};
 use crate::bokeh::reuse::Units;

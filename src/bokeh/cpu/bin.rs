@@ -11,22 +11,11 @@ use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
 use super::tent::{
     MARGIN, Means, PADDED_BLOCK, PLANE_LEN, SUM_PLANES, VectorWeight, accumulate_row, downscale_row, is_zero,
 };
+use super::tiles::Run;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{BinWeight, CELL, MIN_COVERAGE};
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{load, prefetch, store};
-
-/// Columns of the picture inside a block, made together.
-#[derive(Clone, Copy)]
-pub struct Run {
-    pub block: usize,
-    /// The first column: a whole strip of every bin.
-    pub x0: usize,
-    /// Rounded up to whole strips of every bin, also beyond the picture.
-    pub columns: usize,
-    /// Whether these are all columns of the block.
-    pub is_whole: bool,
-}
 
 /// Output of one bin for a band.
 pub struct BinRows<'a> {

@@ -17,6 +17,18 @@ const NEIGHBOURHOOD: (usize, usize) = (1, 3);
 /// Filters of a smaller radius have one tap, in pixels.
 const SHARP_PX: f32 = 0.4;
 
+/// Columns of the picture inside a block, made together.
+#[derive(Clone, Copy)]
+pub struct Run {
+    pub block: usize,
+    /// The first column: a whole strip of every bin.
+    pub x0: usize,
+    /// Rounded up to whole strips of every bin, also beyond the picture.
+    pub columns: usize,
+    /// Whether these are all columns of the block.
+    pub is_whole: bool,
+}
+
 /// The tiles of a picture.
 pub struct Tiles {
     /// Lowest and highest CoC in pixels, row by row.

@@ -8,8 +8,9 @@ use crate::bokeh::occlusion::{
     ONE_SURFACE_PX, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
-    CELL, CROSS_FADE, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
+    CELL, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
 };
+use crate::bokeh::split::CROSS_FADE;
 use crate::compute::device::{Shader, shader};
 
 /// Empties the tile lists.
