@@ -53,8 +53,8 @@ pub struct SingleCamera {
     subject_mask: SubjectMask,
     upsampler: NearnessUpsampler,
     matting: MaskMatting,
-    /// The map of the first of several still pictures, for the others; `None` while anything moves.
-    held: Option<Box<DepthMap>>,
+    /// The map of the first of several still pictures, for the others, and whether there is one.
+    held: (DepthMap, bool),
     /// Index into [`DEPTH_INTERVALS`].
     effort: usize,
     /// Whether frames arrive in real time; if not, the results must not depend on this machine's speed.
@@ -101,7 +101,7 @@ impl SingleCamera {
             subject_mask: SubjectMask::default(),
             upsampler: NearnessUpsampler::default(),
             matting: MaskMatting::default(),
-            held: None,
+            held: (DepthMap::default(), false),
             effort: DEPTH_INTERVALS.len() - 1,
             is_live: false,
             frames: 0,
@@ -201,8 +201,8 @@ impl DepthSource for SingleCamera {
         }
         // Only the mask and the picture decide, so that the map of a still picture serves for the next.
         let is_still = relative_depth.is_none() && person.as_ref().is_some_and(PersonSegmenter::is_still);
-        held.take_if(|held| !is_still || held.size() != color.size());
-        if let Some(held) = held {
+        let (held, is_held) = held;
+        if std::mem::replace(is_held, is_still) && is_still && held.size() == color.size() {
             map.copy_from(held);
             return Ok(());
         }
@@ -229,7 +229,7 @@ impl DepthSource for SingleCamera {
             matting.compute_matte(mask, color, None, map);
         }
         if is_still {
-            *held = Some(Box::new(map.clone()));
+            held.copy_from(map);
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::frame::change::{Prediction, TILE, add_squares, average_squares};
 
-/// The network runs on one of so many pictures at least, so that a change too slight to be detected is followed, too.
+/// Maximum number of pictures in turn without a run, so that a change too slight to be detected is followed, too.
 const MAX_SKIPPED: u32 = 15;
 
 /// Compares the inputs of a network.

@@ -114,7 +114,7 @@ impl SubjectMask {
         let (x, y) = (index % width, index / width);
         for y in y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(height) {
             for x in x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(width) {
-                // A near pixel of nobody else is the subject's.
+                // Near pixels of no other person are the subject's.
                 let neighbour = y * width + x;
                 if self.others[neighbour] || self.nearness[neighbour] < MIN_SUBJECT_NEARNESS {
                     self.mask.alpha[neighbour] = 0.0;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::pipewire::{self, PipewireCamera};
+use super::pipewire_cameras::{self, PipewireCamera};
 use super::{CliError, DevicesCommand};
 use crate::options::Global;
 use crate::terminal;
@@ -45,11 +45,12 @@ struct List {
 /// Fails if no device matches.
 pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     let list = match &command.device {
-        None => {
-            List { pipewire: pipewire::list_cameras(), ..List::from_nodes(node::list_nodes(), false, command.controls) }
-        }
+        None => List {
+            pipewire: pipewire_cameras::list_cameras(),
+            ..List::from_nodes(node::list_nodes(), false, command.controls)
+        },
         Some(name) => match name.strip_prefix("pipewire:") {
-            Some(name) => List { pipewire: pipewire::find_cameras(name)?, ..List::default() },
+            Some(name) => List { pipewire: pipewire_cameras::find_cameras(name)?, ..List::default() },
             None => List::from_nodes(find_nodes(name)?, true, command.controls),
         },
     };
@@ -69,7 +70,7 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
 /// See [`super::format_devices`].
 pub fn format_devices(nodes: &[Node]) -> String {
     let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
-    let list = List { pipewire: pipewire::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
+    let list = List { pipewire: pipewire_cameras::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
     let listed = list.to_string();
     if listed.is_empty() { "none".to_owned() } else { listed }
 }

@@ -3,7 +3,7 @@
 #[cfg(feature = "camera")]
 mod list;
 #[cfg(feature = "camera")]
-mod pipewire;
+mod pipewire_cameras;
 
 use clap::Args;
 
