@@ -78,7 +78,9 @@ impl Blur {
         (size, adaptive): ((u32, u32), bool),
         make: impl FnOnce(&Settings) -> Result<Box<dyn Bokeh>, E>,
     ) -> Result<(), E> {
-        let executor_settings = look.blur_settings(size, adaptive);
+        // Nothing says that these frames come in real time.
+        let reuse = look.reuse.is_on(false);
+        let executor_settings = look.blur_settings(size, adaptive).map(|settings| Settings { reuse, ..settings });
         if executor_settings != self.executor_settings {
             let executor = executor_settings.as_ref().map(make).transpose()?;
             self.replace_executor(executor, look.quality_rule(adaptive));
