@@ -19,7 +19,7 @@ use crate::frame::change::{Prediction, TILE};
 
 /// Bins whose content has at least this radius, in pixels, are kept; below, a result follows details that the means of
 /// tiles do not show.
-pub const MIN_KEPT_RADIUS_PX: f32 = 3.5;
+pub const MIN_KEPT_RADIUS_PX: f32 = 5.0;
 /// Columns and rows of the smallest result that is kept, in pixels, unless a coarse bin needs more rows.
 const RESULT_SIZE: (usize, usize) = (64, 16);
 /// Columns of the smallest content that is kept, in pixels, unless a coarse bin needs more.

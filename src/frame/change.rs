@@ -189,7 +189,7 @@ impl Prediction {
 
     /// Marks the units, `across` tiles wide, of some rows of tiles where the frame differs from the held content.
     pub fn find_changed(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
-        mark_different(&self.now, &self.held, &self.bounds, rows, across, units);
+        mark_different(&self.now, &self.held, &self.bounds, (rows, across), units);
     }
 
     /// Replaces the held content of the marked units by the current frame's.
@@ -207,7 +207,7 @@ impl Prediction {
     pub fn find_outdated(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
         let [luma, chroma] = RESULT_BOUND;
         let bounds = [luma, chroma, chroma, RESULT_COC_BOUND * self.bounds[3]];
-        mark_different(&self.held, &self.made, &bounds, rows, across, units);
+        mark_different(&self.held, &self.made, &bounds, (rows, across), units);
     }
 
     /// Notes that the results of the marked units are made of the held content.
@@ -238,20 +238,21 @@ fn predict_result(means: &TileMeans, weights: Weights, scratch: &mut [f32], out:
     }
 }
 
-/// Marks the units in which any blurred tile of two predictions differs by more than `bounds`.
+/// Marks the units, `across` tiles wide, in or beside which any blurred tile of two predictions differs by more than
+/// `bounds`: a prediction is of the middle of its tile, and a disc at its border, or a pixel of a coarse bin, reads the
+/// next one.
 fn mark_different(
     a: &TileMeans,
     b: &TileMeans,
     bounds: &[f32; MEANS],
-    rows: Range<usize>,
-    across: usize,
+    (rows, across): (Range<usize>, usize),
     units: &mut [bool],
 ) {
-    for row in rows.start..rows.end.min(a.down) {
+    for row in rows.start.saturating_sub(1)..(rows.end + 1).min(a.down) {
         let tiles = row * a.across..(row + 1) * a.across;
         let [a, b] = [a, b].map(|side| side.planes.each_ref().map(|plane| &plane[tiles.clone()]));
         for (unit, first) in units.iter_mut().zip((0..tiles.len()).step_by(across)) {
-            *unit |= (first..(first + across).min(tiles.len())).any(|tile| {
+            *unit |= (first.saturating_sub(1)..(first + across + 1).min(tiles.len())).any(|tile| {
                 let is_blurred = a[3][tile].abs().max(b[3][tile].abs()) > IN_FOCUS_PX;
                 is_blurred && (0..MEANS).any(|plane| (a[plane][tile] - b[plane][tile]).abs() > bounds[plane])
             });

@@ -28,9 +28,13 @@ struct Pair {
 
 impl Both {
     fn new(kind: CocKind, threads: usize) -> Self {
+        Self::with_size(kind, threads, SIZE)
+    }
+
+    fn with_size(kind: CocKind, threads: usize, (width, height): (u32, u32)) -> Self {
         let executor =
-            |reuse| CpuBokeh::new(Plan::new(&Settings { reuse, ..settings(kind) }, SIZE.0, SIZE.1), Some(threads));
-        Self { keeping: executor(true), fresh: executor(false), field: coc(kind, SIZE.1) }
+            |reuse| CpuBokeh::new(Plan::new(&Settings { reuse, ..settings(kind) }, width, height), Some(threads));
+        Self { keeping: executor(true), fresh: executor(false), field: coc(kind, height) }
     }
 
     fn blur(&mut self, color: &ColorImage, map: &DepthMap) -> Pair {
@@ -180,5 +184,28 @@ fn the_same_frames_give_the_same_pictures_on_any_number_of_threads() {
         let [one, two, three] = executors.each_mut().map(|both| both.blur(&picture, &map));
         assert!(one.kept == two.kept && one.fraction == two.fraction, "{frame}");
         assert!(one.kept == three.kept && one.fraction == three.fraction, "{frame}");
+    }
+}
+
+#[test]
+fn pictures_of_any_size_keep_what_is_still() {
+    for (width, height) in [(1, 1), (5, 7), (65, 33), (333, 201), (1300, 90), (64, 700)] {
+        for kind in COC_KINDS {
+            let mut both = Both::with_size(kind, 2, (width, height));
+            for frame in 0..12u32 {
+                // Not at the borders, whose pixels stand for all beyond.
+                let left = width / 8 + (4 * frame).min(width / 4);
+                let is_subject =
+                    |x: u32, y: u32| (left..left + width / 4).contains(&x) && (height / 3..2 * height / 3).contains(&y);
+                let picture = color(width, height, |x, y| {
+                    let code = if is_subject(x, y) { 90 } else { 60 + (40 * (x / 20 % 2) + 30 * (y / 16 % 3)) as u8 };
+                    [code, code + 9, code + 40]
+                });
+                let map = depth(width, height, |x, y| if is_subject(x, y) { 1.0 } else { 3.5 });
+                let pair = both.blur(&picture, &map);
+                let worst = codes_apart(&pair.kept, &pair.fresh);
+                assert!(worst <= 5, "{width}x{height} {kind:?} {frame}: {worst}");
+            }
+        }
     }
 }

@@ -17,6 +17,9 @@ use crate::compute::thread_pool::DisjointParts;
 use crate::frame::change::TILE;
 use crate::optics::CocField;
 
+/// Rows and columns of the smallest picture of which anything is kept, in pixels.
+const MIN_SIDE: usize = 64;
+
 /// The last result, and what changed since.
 pub struct Held {
     pub detector: ChangeDetector,
@@ -62,6 +65,10 @@ impl Held {
             return None;
         }
         let (width, height) = (plan.width, plan.height);
+        // Of small pictures, the borders are most, where few pixels stand for all beyond.
+        if width.min(height) < MIN_SIDE {
+            return None;
+        }
         let flags = || std::iter::repeat_with(|| AtomicBool::new(false)).take(height.div_ceil(TILE)).collect();
         Some(Self {
             detector: ChangeDetector::new(width, height),
