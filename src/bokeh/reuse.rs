@@ -157,9 +157,8 @@ impl ChangeDetector {
         }
         self.frame += 1;
         let renewed = self.renewed_rows(plan.height);
-        let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1);
         let Self { prediction, content, results, .. } = self;
-        content.reset(plan, (CONTENT_W.max(CONTENT_BIN_W * coarsest), content_rows(plan)));
+        content.reset(plan, content_size(plan));
         content.for_each_row(|rows, across, units| prediction.find_changed(rows, across, units));
         content.mark_rows(&renewed);
         if content.kept_fraction() < 1.0 - MAX_CHANGED {
@@ -202,10 +201,11 @@ impl ChangeDetector {
     }
 }
 
-/// Returns the rows in which the bins are made together: whole rows of cells of every bin, and not too few, as each
-/// group of rows reads some of its neighbours again.
-pub fn content_rows(plan: &Plan) -> usize {
-    CELL * plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2])
+/// Returns the columns and rows of the smallest content that is kept, in pixels: whole columns and rows of cells of every
+/// bin. The bins are made in groups of these rows, not too few, as each group reads some of its neighbours again.
+pub fn content_size(plan: &Plan) -> (usize, usize) {
+    let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1);
+    (CONTENT_W.max(CONTENT_BIN_W * coarsest), CELL * coarsest.max(SCALES[2]))
 }
 
 /// Whether the result of a bin may be kept. Near objects move most, and are few.

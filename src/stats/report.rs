@@ -1,4 +1,4 @@
-//! The report of a run: JSON for measurements, a few lines for people.
+//! The report of a run, as JSON for measurements.
 
 use std::io;
 
@@ -150,7 +150,8 @@ pub struct Versions {
 }
 
 impl Report {
-    /// Summarises a run. Frame counts that do not [balance](FrameCounts::is_balanced) are a bug of this program and logged.
+    /// Summarises a run. Frame counts that do not [balance](FrameCounts::is_balanced) are a bug of this program, and
+    /// logged.
     pub fn new(frames: FrameCounts, timings: &Timings, info: RunInfo) -> Self {
         if !frames.is_balanced() {
             tracing::error!(?frames, "the frames do not add up: please report this");

@@ -17,7 +17,7 @@ use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MAX_LAYERS;
 use crate::bokeh::plan::MAX_BINS;
-use crate::bokeh::reuse::{Units, content_rows, is_kept};
+use crate::bokeh::reuse::{Units, content_size, is_kept};
 use crate::compute::thread_pool::DisjointParts;
 
 impl CpuBokeh {
@@ -83,7 +83,7 @@ impl CpuBokeh {
     ) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
-        let rows = content_rows(plan);
+        let (_, rows) = content_size(plan);
         let mut bin_parts: [Option<BinParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in_slot(slot.index) else { continue };
