@@ -20,9 +20,10 @@ const CHUNK = 62u;
 
 // Pixels of all rows, per term.
 var<workgroup> values: array<vec2<u32>, 4 * CHUNK * RESULT_TILE_X>;
-// Whether each of the first row tiles in the support of a tile has content. Most filters need no more tiles.
+// Whether each of the first row tiles in the support of a tile has content (1), as in blur_rows. Most filters need no
+// more tiles.
 const CACHED = 24u;
-var<workgroup> cached: array<bool, CACHED>;
+var<workgroup> cached: array<u32, CACHED>;
 
 fn list_offset(k: u32) -> u32 {
     return bins[k].active_at;
@@ -36,7 +37,7 @@ fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
 fn is_filtered_cached(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     let tile = pixel.y / ROWS_TILE_Y - first;
     if tile < CACHED {
-        return cached[tile];
+        return cached[tile] == 1u;
     }
     return is_filtered(k, pixel);
 }
@@ -82,7 +83,7 @@ fn filter_columns(k: u32, number: u32, local: vec2<u32>, thread: u32) {
     let threads = RESULT_TILE_X * RESULT_TILE_Y;
     let first_tile = u32(max(first, 0)) / ROWS_TILE_Y;
     for (var n = thread; n < CACHED && (first_tile + n) * ROWS_TILE_Y < u32(min(first + length, i32(size.y))); n += threads) {
-        cached[n] = is_filtered(k, vec2(corner_pixel.x, (first_tile + n) * ROWS_TILE_Y));
+        cached[n] = select(0u, 1u, is_filtered(k, vec2(corner_pixel.x, (first_tile + n) * ROWS_TILE_Y)));
     }
     workgroupBarrier();
     let inside = all(pixel < size);

@@ -18,9 +18,10 @@
 const CHUNK = 128u;
 
 var<workgroup> values: array<vec2<u32>, CHUNK * ROWS_TILE_Y>;
-// Whether each of the first cells in the support of a tile has content. Most filters need no more cells.
+// Whether each of the first cells in the support of a tile has content (1). Most filters need no more cells. Not
+// `bool`: with NVIDIA's driver 580, arrays of it in workgroup memory lose values.
 const CACHED = 24u;
-var<workgroup> cached: array<bool, CACHED>;
+var<workgroup> cached: array<u32, CACHED>;
 
 fn list_offset(k: u32) -> u32 {
     return bins[k].filtered_at;
@@ -46,7 +47,7 @@ fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
 fn is_covered_cached(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     let cell = pixel.x / CELL - first;
     if cell < CACHED {
-        return cached[cell];
+        return cached[cell] == 1u;
     }
     return is_covered(k, pixel);
 }
@@ -76,7 +77,7 @@ fn filter_rows(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let threads = i32(ROWS_TILE_X * ROWS_TILE_Y);
     let first_cell = u32(max(first, 0)) / CELL;
     for (var n = thread; n < CACHED && (first_cell + n) * CELL < u32(min(first + length, i32(size.x))); n += u32(threads)) {
-        cached[n] = is_covered(k, vec2((first_cell + n) * CELL, corner_pixel.y));
+        cached[n] = select(0u, 1u, is_covered(k, vec2((first_cell + n) * CELL, corner_pixel.y)));
     }
     workgroupBarrier();
     let inside = all(pixel < size);

@@ -69,7 +69,6 @@ pub struct Device {
     /// Instance that found the adapter; also creates the surfaces of windows.
     pub instance: wgpu::Instance,
     /// Adapter that the device was opened on.
-    /// Adapter that the device was opened on.
     pub adapter: wgpu::Adapter,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,

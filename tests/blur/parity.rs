@@ -94,8 +94,9 @@ fn close(a: &[[f32; 4]], b: &[[f32; 4]], limit: f32, what: &str) {
     let some = differences.len() / 1000 + 1;
     assert!(
         beyond <= some && worst <= 10.0 * limit,
-        "{what}: {beyond} of {} beyond {limit}, worst {worst}",
-        a.len() * 4
+        "{what}: {beyond} of {} beyond {limit}, worst {worst}; first {:?}",
+        a.len() * 4,
+        a.iter().zip(b).enumerate().find(|(_, (a, b))| (0..4).any(|k| !((a[k] - b[k]).abs() <= limit)))
     );
 }
 

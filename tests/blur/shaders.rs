@@ -34,7 +34,24 @@ fn every_shader_validates_and_is_named_like_its_file() {
         assert_eq!(entries, [shader.name]);
         let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
         assert_eq!(overrides, constants);
+        assert_eq!(shared_booleans(&module), [""; 0], "{}", shader.name);
     }
+}
+
+/// Names of workgroup variables of booleans, whose values NVIDIA's driver 580 loses.
+fn shared_booleans(module: &naga::Module) -> Vec<&str> {
+    let holds_booleans = |mut ty| loop {
+        match module.types[ty].inner {
+            naga::TypeInner::Array { base, .. } => ty = base,
+            naga::TypeInner::Scalar(scalar) => break scalar.kind == naga::ScalarKind::Bool,
+            naga::TypeInner::Vector { scalar, .. } => break scalar.kind == naga::ScalarKind::Bool,
+            _ => break false,
+        }
+    };
+    let shared = module.global_variables.iter().map(|(_, variable)| variable);
+    let shared =
+        shared.filter(|variable| variable.space == naga::AddressSpace::WorkGroup && holds_booleans(variable.ty));
+    shared.filter_map(|variable| variable.name.as_deref()).collect()
 }
 
 #[test]
