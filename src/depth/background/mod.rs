@@ -65,6 +65,8 @@ pub struct BackgroundMemory {
     changed: Vec<bool>,
     /// Evidence from beside the outlines, per cell.
     cell_evidence: Vec<OutlineEvidence>,
+    /// Scratch: steps of inverse depth at the pixels of a row, in 1/m.
+    outline_steps: Vec<f32>,
     reducer: Reducer,
     now: Vec<[f32; 3]>,
     aligner: Aligner,
@@ -98,6 +100,7 @@ impl Default for BackgroundMemory {
             hidden: Vec::new(),
             changed: Vec::new(),
             cell_evidence: Vec::new(),
+            outline_steps: Vec::new(),
             reducer: Reducer::default(),
             now: Vec::new(),
             aligner: Aligner::default(),

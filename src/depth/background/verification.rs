@@ -5,6 +5,8 @@
 //! behind the subject, and behind the object too, or else the old background would appear where the object continues
 //! behind the subject.
 
+use pulp::{Arch, WithSimd};
+
 use super::cells::CELL;
 use super::{BackgroundMemory, MIN_ROUNDS};
 use crate::depth::reduced::block_px;
@@ -52,12 +54,19 @@ impl BackgroundMemory {
         let mut cell_evidence = std::mem::take(&mut self.cell_evidence);
         cell_evidence.clear();
         cell_evidence.resize(across * down, OutlineEvidence::default());
+        let mut steps = std::mem::take(&mut self.outline_steps);
+        steps.resize(width, 0.0);
         let seen = Comparison { memory: self, metres: &map.metres, surface_step, block_px: block_px(color.width) };
         for y in (0..height).step_by(STEP) {
-            for x in (0..width).step_by(STEP) {
+            // Beyond the picture, the row itself stands in: it has no step to itself.
+            let row = |y: usize| &map.metres[(if y < height { y } else { y - BESIDE_PX }) * width..][..width];
+            let above = y.checked_sub(BESIDE_PX).unwrap_or(y);
+            Arch::new().dispatch(FindSteps { rows: [row(above), row(y), row(y + BESIDE_PX)], steps: &mut steps });
+            for x in (0..width).step_by(STEP).filter(|&x| steps[x] > MIN_STEP * surface_step) {
                 seen.collect_evidence((x, y), &mut cell_evidence[y / CELL * across + x / CELL]);
             }
         }
+        self.outline_steps = steps;
         let mut forgets = false;
         for (at, evidence) in
             cell_evidence.iter().enumerate().filter(|(_, evidence)| evidence.contradicting > evidence.agreeing)
@@ -106,6 +115,37 @@ impl BackgroundMemory {
         }
         if forgets {
             self.assign_revision();
+        }
+    }
+}
+
+/// Computes the largest step of inverse depth from each pixel of a row down to the surfaces on its four sides, in 1/m:
+/// few pixels are at outlines.
+struct FindSteps<'a> {
+    /// Metres of the row above, of the row itself, and of the row below, [`BESIDE_PX`] away.
+    rows: [&'a [f32]; 3],
+    steps: &'a mut [f32],
+}
+
+impl WithSimd for FindSteps<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { rows: [above, own, below], steps } = self;
+        let inverse = DepthMap::inverse_depth;
+        let beside = BESIDE_PX.min(own.len());
+        for ((farthest, &above), &below) in steps.iter_mut().zip(above).zip(below) {
+            *farthest = inverse(above).min(inverse(below));
+        }
+        for (farthest, &left) in steps[beside..].iter_mut().zip(own) {
+            *farthest = farthest.min(inverse(left));
+        }
+        for (farthest, &right) in steps.iter_mut().zip(&own[beside..]) {
+            *farthest = farthest.min(inverse(right));
+        }
+        for (step, &own) in steps.iter_mut().zip(own) {
+            *step = inverse(own) - *step;
         }
     }
 }
