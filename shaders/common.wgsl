@@ -41,7 +41,7 @@ const MIXED_FLAG = 0x8000u; // flag of a scene pixel: see pack_scene
 struct Frame {
     size: vec2<u32>,            // columns, rows
     depth_size: vec2<u32>,
-    coc_kind: u32,              // 0 uniform, 1 ramp, 2 depth as CoC, 3 depth in metres
+    coc_kind: u32,              // 0 uniform, 1 ramp, 2 depth
     compositing: u32,           // 0 layers, 1 select, 2 gather
     bins: u32,
     near_bins: u32,             // the first bins

@@ -1,4 +1,4 @@
-// Shared by passes that compute the CoC of any pixel. Such a pass binds `frame`, and the depth map as `radii`.
+// Shared by passes that compute the CoC of any pixel. Such a pass binds `frame`, and the depth map as `metres`.
 // twin: src/optics.rs
 
 fn coc_at(x: u32, y: u32) -> f32 {
@@ -10,27 +10,18 @@ fn coc_at(x: u32, y: u32) -> f32 {
         return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
     }
     if all(frame.depth_size == frame.size) {
-        return load_coc(y * frame.size.x + x);
+        return depth_to_coc(metres[y * frame.size.x + x]);
     }
     let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
     let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
-    return load_coc(row * frame.depth_size.x + column);
+    return depth_to_coc(metres[row * frame.depth_size.x + column]);
 }
 
-fn load_coc(index: u32) -> f32 {
-    if frame.coc_kind == 3u {
-        return depth_to_coc(bitcast<f32>(radii[index]));
-    }
-    let roots = unpack2x16snorm(radii[index / 2u]);
-    let root = select(roots.x, roots.y, index % 2u == 1u);
-    return root * abs(root) * frame.max_px;
-}
-
-fn depth_to_coc(metres: f32) -> f32 {
+fn depth_to_coc(distance_m: f32) -> f32 {
     // Unknown depth counts as infinite. The largest finite number stands in for infinity.
     var inverse_m = 0.0;
-    if metres > 0.0 && metres < 3.0e38 {
-        inverse_m = 1.0 / metres;
+    if distance_m > 0.0 && distance_m < 3.0e38 {
+        inverse_m = 1.0 / distance_m;
     }
     // 1 within the sharp range; outside, the end of the range whose ratio is nearer to 1.
     let ratio = max(frame.coc.y * inverse_m, min(frame.coc.z * inverse_m, 1.0));

@@ -1,5 +1,5 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; separates mixed pixels into two surfaces. Reads
-// packed RGB bytes, and the signed CoC or metres of a depth map. Writes linear r, g, b and the CoC in pixels, and the
+// packed RGB bytes, and the depth map. Writes linear r, g, b and the CoC in pixels, and the
 // CoC range of every tile; clears `shown`; lists the tiles of the foremost layer's bins; marks the silhouettes, one row
 // of a grid cell per thread.
 // twin: src/bokeh/cpu/unpack.rs, src/bokeh/cpu/marking.rs
@@ -8,7 +8,7 @@
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> color: array<u32>;
-@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC per word, as in pack_scene; or metres
+@group(0) @binding(4) var<storage, read> metres: array<f32>;
 @group(0) @binding(5) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;

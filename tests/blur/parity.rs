@@ -96,7 +96,7 @@ fn close(a: &[[f32; 4]], b: &[[f32; 4]], limit: f32, what: &str) {
         beyond <= some && worst <= 10.0 * limit,
         "{what}: {beyond} of {} beyond {limit}, worst {worst}; first {:?}",
         a.len() * 4,
-        a.iter().zip(b).enumerate().find(|(_, (a, b))| (0..4).any(|k| !((a[k] - b[k]).abs() <= limit)))
+        a.iter().zip(b).enumerate().find(|(_, (a, b))| (0..4).any(|k| off((&a[k], &b[k])) > limit || b[k].is_nan()))
     );
 }
 

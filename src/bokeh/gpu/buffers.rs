@@ -158,9 +158,9 @@ impl Buffers {
         }
     }
 
-    /// Creates a buffer of `bytes` bytes for a depth map.
-    pub fn create_depth_buffer(device: &Device, bytes: u64) -> wgpu::Buffer {
-        device.create_buffer("radii", bytes as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
+    /// Creates a buffer for a depth map of `pixels` pixels.
+    pub fn create_depth_buffer(device: &Device, pixels: usize) -> wgpu::Buffer {
+        device.create_buffer("depth", 4 * pixels, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 }
 

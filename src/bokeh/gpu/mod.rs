@@ -6,7 +6,6 @@ mod buffers;
 mod layout;
 mod passes;
 mod probe;
-mod radii;
 mod readback;
 mod self_test;
 pub mod shaders;
@@ -40,8 +39,8 @@ pub struct GpuBokeh {
     plan: Plan,
     device: Arc<Device>,
     buffers: Buffers,
-    /// Depth map of the current frame, as CoC or in metres; grows to the largest one seen.
-    radii: wgpu::Buffer,
+    /// Depth map of the current frame, in metres; grows to the largest one seen.
+    metres: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
     passes: Passes,
@@ -81,12 +80,12 @@ impl GpuBokeh {
             .into());
         }
         let buffers = Buffers::new(&device, plan, &capacity);
-        let radii = Buffers::create_depth_buffer(&device, radii::radii_bytes(plan.width * plan.height));
-        let passes = Passes::new(&device, plan, &buffers, &radii);
+        let metres = Buffers::create_depth_buffer(&device, plan.width * plan.height);
+        let passes = Passes::new(&device, plan, &buffers, &metres);
         let ring = Ring::new(&device, buffers::packed_picture_bytes(plan) as usize);
         device.check()?;
         let (plan, layout, refused, results) = (plan.clone(), Layout::new(), None, None);
-        Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results })
+        Ok(Self { plan, device, buffers, metres, capacity, layout, passes, ring, refused, results })
     }
 
     /// Returns a free picture on the device for a result, if `place` asks for one.
@@ -100,14 +99,14 @@ impl GpuBokeh {
             .try_take()
     }
 
-    /// Returns the uniform `Frame` of a job, whose depth may be `in_metres`; see `common.wgsl` for the values.
-    fn frame_uniform(&self, job: &Job, in_metres: bool) -> shaders::Frame {
+    /// Returns the uniform `Frame` of a job; see `common.wgsl` for the values.
+    fn frame_uniform(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
             CocField::Depth(d) => {
-                (2 + u32::from(in_metres), [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2])
+                (2, [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2])
             }
         };
         shaders::Frame {
@@ -180,15 +179,14 @@ impl Bokeh for GpuBokeh {
         // Kept until this frame is submitted: its buffers may be overwritten only afterwards.
         let shared = job.on_device.take().filter(is_here);
         let mut shared_metres = None;
-        if let (CocField::Depth(lens), Some(map)) = (job.coc, &job.depth) {
+        if let (CocField::Depth(_), Some(map)) = (job.coc, &job.depth) {
             shared_metres = shared.as_deref().filter(|_| map.size() == made_for).map(|frame| &frame.metres);
-            let bytes = shared_metres.map_or(radii::radii_bytes(map.metres.len()), wgpu::Buffer::size);
-            if bytes > self.radii.size() {
-                self.radii = Buffers::create_depth_buffer(&self.device, bytes);
-                self.passes.bind_depth_buffer(&self.device, &self.buffers, &self.radii);
+            if 4 * map.metres.len() as u64 > self.metres.size() {
+                self.metres = Buffers::create_depth_buffer(&self.device, map.metres.len());
+                self.passes.bind_depth_buffer(&self.device, &self.buffers, &self.metres);
             }
             if shared_metres.is_none() {
-                radii::upload_coc(&self.device.queue, &self.radii, map, lens, max_coc_px(&job.coc));
+                self.device.upload(&self.metres, 0, bytemuck::cast_slice(&map.metres));
             }
         }
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
@@ -198,7 +196,7 @@ impl Bokeh for GpuBokeh {
         self.plan.split_by_depth(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
         self.passes.upload(&self.device, &self.buffers, &self.plan, &self.layout);
-        let frame = self.frame_uniform(&job, shared_metres.is_some());
+        let frame = self.frame_uniform(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut recorder = Recorder::new(&self.device, slot.stamps.as_mut());
@@ -210,7 +208,7 @@ impl Bokeh for GpuBokeh {
             None => self.device.upload(color, 0, &job.color.rgb),
         }
         if let Some(metres) = shared_metres {
-            recorder.encoder.copy_buffer_to_buffer(metres, 0, &self.radii, 0, metres.size());
+            recorder.encoder.copy_buffer_to_buffer(metres, 0, &self.metres, 0, metres.size().min(self.metres.size()));
         }
         self.passes.record(&mut recorder, &self.plan, &self.layout);
         let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);

@@ -74,8 +74,8 @@ impl PassBuilder<'_> {
 }
 
 /// Returns the bindings of `unpack`, including the depth map, whose buffer may be replaced.
-fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
-    let read = [&b.bins, &b.frame, &b.color, radii];
+fn unpack_bindings<'a>(b: &'a Buffers, metres: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
+    let read = [&b.bins, &b.frame, &b.color, metres];
     let buffers = read.into_iter().chain([&b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned, &b.marks]);
     std::iter::once(uniform_binding::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
@@ -93,7 +93,7 @@ fn covering_workgroups(size: [u32; 2], tile: u32) -> [u32; 3] {
 
 impl Passes {
     /// Creates the passes of a plan over its buffers.
-    pub fn new(device: &Device, plan: &Plan, b: &Buffers, radii: &wgpu::Buffer) -> Self {
+    pub fn new(device: &Device, plan: &Plan, b: &Buffers, metres: &wgpu::Buffer) -> Self {
         let builder = PassBuilder { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
         let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
@@ -172,7 +172,7 @@ impl Passes {
             device,
             shaders::UNPACK,
             &shaders::CONSTANTS,
-            unpack_bindings(b, radii),
+            unpack_bindings(b, metres),
             covering_workgroups(picture, TILE),
         );
         let cleared = looping_workgroups(b.grid.size() as usize / (16 * WORKGROUP_1D as usize));
@@ -191,8 +191,8 @@ impl Passes {
     }
 
     /// Binds a new buffer for depth maps.
-    pub fn bind_depth_buffer(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
-        self.unpack.rebind(device, unpack_bindings(b, radii));
+    pub fn bind_depth_buffer(&mut self, device: &Device, b: &Buffers, metres: &wgpu::Buffer) {
+        self.unpack.rebind(device, unpack_bindings(b, metres));
     }
 
     /// Uploads the bins of each pass of this frame, with the terms of the plan's bank.
