@@ -18,7 +18,7 @@ use bokehcam::compute::Device;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::BackgroundMemory;
 use bokehcam::depth::matting::gpu::GpuMatting;
-use bokehcam::depth::matting::{KnownBackground, MIN_STEP_PX, Matting};
+use bokehcam::depth::matting::{KnownBackground, MIN_STEP_PX, Matting, Revision};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
@@ -186,7 +186,7 @@ fn what_is_known_behind_counts_as_on_the_processor() {
             min_rounds: 2,
             light: &light,
             surface_step: 2.0 * JUMP,
-            revision: 1000 + k as u64,
+            revision: Revision { picture: 1000 + k as u64, rounds: 2000 + k as u64 },
         };
         for behind in [Some(&behind), None, Some(&behind)] {
             let [expected, made] = [&mut cpu, &mut gpu].map(|matting| matted(matting, &frame, behind));

@@ -105,9 +105,7 @@ impl GpuBokeh {
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
-            CocField::Depth(d) => {
-                (2, [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2])
-            }
+            CocField::Depth(d) => (2, [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2]),
         };
         shaders::Frame {
             size: [plan.width as u32, plan.height as u32],

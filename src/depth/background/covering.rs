@@ -35,7 +35,7 @@ impl BackgroundMemory {
             *forgets = Arch::new().dispatch(UpdateCovering { metres, inverse, rounds, covering, surface_step });
         });
         if forgets.contains(&true) {
-            self.assign_revision();
+            self.assign_rounds_revision();
             self.check_outlines(map, color, surface_step);
         }
     }

@@ -20,7 +20,7 @@ use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
 use super::bitmap::Bitmap;
-use super::matting::{KnownBackground, MIN_STEP_PX, Matting};
+use super::matting::{KnownBackground, MIN_STEP_PX, Matting, Revision};
 use super::reduced::{MAX_VALUE, Reducer, block_px, reduced_size};
 use cells::Cells;
 use verification::OutlineEvidence;
@@ -51,8 +51,8 @@ pub struct BackgroundMemory {
     rounds: Vec<u8>,
     /// Inverse depth of the covering surface, in 1/m; 0 without one.
     covering: Vec<f32>,
-    /// A number unique to this content of the three ([`KnownBackground::revision`]).
-    revision: u64,
+    /// The revision of the three.
+    revision: Revision,
     frame: usize,
     time_ns: u64,
     /// Updates resume at this media time, after a camera movement.
@@ -91,7 +91,7 @@ impl Default for BackgroundMemory {
             inverse: Vec::new(),
             rounds: Vec::new(),
             covering: Vec::new(),
-            revision: 0,
+            revision: Revision::default(),
             frame: 0,
             time_ns: 0,
             resumes_ns: 0,
@@ -191,10 +191,16 @@ impl BackgroundMemory {
         self.assign_revision();
     }
 
-    /// Assigns a new revision, since the content changes.
+    /// Assigns new revisions, since the content changes.
     fn assign_revision(&mut self) {
+        self.assign_rounds_revision();
+        self.revision.picture = self.revision.rounds;
+    }
+
+    /// Assigns a new revision to the rounds, since pixels were forgotten.
+    fn assign_rounds_revision(&mut self) {
         static REVISIONS: AtomicU64 = AtomicU64::new(1);
-        self.revision = REVISIONS.fetch_add(1, Ordering::Relaxed);
+        self.revision.rounds = REVISIONS.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Estimates the current exposure, and returns whether the camera has stayed in place.

@@ -85,7 +85,7 @@ impl BackgroundMemory {
         }
         self.cell_evidence = cell_evidence;
         if forgets {
-            self.assign_revision();
+            self.assign_rounds_revision();
         }
     }
 
@@ -114,7 +114,7 @@ impl BackgroundMemory {
             }
         }
         if forgets {
-            self.assign_revision();
+            self.assign_rounds_revision();
         }
     }
 }

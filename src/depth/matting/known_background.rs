@@ -16,8 +16,17 @@ pub struct KnownBackground<'a> {
     pub light: &'a [[f32; 256]; 3],
     /// Minimum step of inverse depth, in 1/m, from a surface to the background behind it.
     pub surface_step: f32,
-    /// A number unique in this process for this content of `rgb`, `inverse` and `rounds`.
-    pub revision: u64,
+    /// The revision of this content.
+    pub revision: Revision,
+}
+
+/// Numbers unique in this process for the content of a remembered background: what is forgotten changes the rounds alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Revision {
+    /// Of `rgb` and `inverse`.
+    pub picture: u64,
+    /// Of `rounds`.
+    pub rounds: u64,
 }
 
 impl KnownBackground<'_> {

@@ -31,7 +31,7 @@ use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
-pub use known_background::{KnownBackground, light_at};
+pub use known_background::{KnownBackground, Revision, light_at};
 
 use super::bitmap::Bitmap;
 use alpha::{Evidence, LANES, Labels, Prior};

@@ -20,7 +20,7 @@ use buffers::{Buffers, Extent, background_offsets};
 use passes::Passes;
 use shaders::Frame;
 
-use super::KnownBackground;
+use super::{KnownBackground, Revision};
 use crate::color::srgb_to_linear_table;
 use crate::compute::device::{Device, DeviceFrame, Recorder, Timestamps};
 use crate::compute::{GpuError, PassTimes};
@@ -47,7 +47,7 @@ struct Resources {
     buffers: Buffers,
     passes: Passes,
     /// Revision of the remembered background on the device.
-    revision: Option<u64>,
+    revision: Option<Revision>,
     /// Number of mixed pixels to read back at once: somewhat more than in the last frame.
     expected: usize,
     timestamps: Option<Timestamps>,
@@ -135,12 +135,16 @@ impl Resources {
             surface_step,
         };
         device.upload(&b.frame, 0, bytemuck::bytes_of(&frame));
-        if let Some(background) = background.filter(|background| self.revision != Some(background.revision)) {
+        if let Some(background) = background {
             let [rgb, rounds, inverse] = background_offsets(pixels);
-            device.upload(&b.background, rgb, background.rgb);
-            device.upload(&b.background, rounds, background.rounds);
-            device.upload(&b.background, inverse, bytemuck::cast_slice(background.inverse));
-            self.revision = Some(background.revision);
+            let before = self.revision.replace(background.revision);
+            if before.map(|before| before.picture) != Some(background.revision.picture) {
+                device.upload(&b.background, rgb, background.rgb);
+                device.upload(&b.background, inverse, bytemuck::cast_slice(background.inverse));
+            }
+            if before.map(|before| before.rounds) != Some(background.revision.rounds) {
+                device.upload(&b.background, rounds, background.rounds);
+            }
         }
         let mut recorder = Recorder::new(device, self.timestamps.as_mut());
         let is_whole = |frame: &DeviceFrame| (frame.metres.size(), frame.rgb.size()) == (b.metres.size(), b.rgb.size());

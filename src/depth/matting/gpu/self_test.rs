@@ -7,7 +7,7 @@ use super::GpuMatting;
 use crate::compute::GpuError;
 use crate::compute::device::{Device, SelfTest};
 use crate::compute::thread_pool::ThreadPool;
-use crate::depth::matting::KnownBackground;
+use crate::depth::matting::{KnownBackground, Revision};
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
 const SIZE: (u32, u32) = (96, 64);
@@ -33,7 +33,7 @@ pub fn run_self_test(device: &Arc<Device>) -> Result<SelfTest, GpuError> {
         min_rounds: 1,
         light: &light,
         surface_step: STEP,
-        revision: 0,
+        revision: Revision::default(),
     };
     let (mut wrong, mut all) = (0, 0);
     for background in [None, Some(&background)] {
