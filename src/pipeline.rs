@@ -41,7 +41,7 @@ use crate::clock::{self, Clock};
 use crate::engine::{Blur, Engine};
 use crate::link::{self, Receiver, Sender};
 use crate::sink::{self, Ending};
-use crate::stats::{FrameCounter, Report, RunInfo, Timings};
+use crate::stats::{EnergyMeter, FrameCounter, Report, RunInfo, Timings};
 
 /// State shared by all stages of a run.
 struct Shared {
@@ -95,7 +95,7 @@ impl Shared {
 /// Returns the fault of the stage that failed, a panic included, with the report. The output then has the frames
 /// delivered so far.
 pub fn run(mut run: Run) -> Result<Report, PipelineError> {
-    let (began_ns, cpu_ns) = (run.clock.now_ns(), clock::process_cpu_ns());
+    let (began_ns, cpu_ns, energy) = (run.clock.now_ns(), clock::process_cpu_ns(), EnergyMeter::start());
     let Engine { preprocessor, blur } = run.create_engine();
     let shared = Shared::new(&run, &blur);
     let Shared { info, counter, has_ended, .. } = &shared;
@@ -134,6 +134,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         pipewire: sink::read_counters(&nodes),
         elapsed_ns: shared.clock.now_ns() - began_ns,
         cpu_ns: clock::process_cpu_ns() - cpu_ns,
+        energy_j: Some(energy.joules()),
         ..about
     };
     let report = Report::new(counter.frame_counts(), &timings, about);

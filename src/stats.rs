@@ -2,6 +2,7 @@
 //!
 //! Memory is bounded for a run of any length, and counting a frame does not allocate.
 
+mod energy;
 mod frame_counter;
 mod frame_rate;
 mod histogram;
@@ -10,6 +11,7 @@ mod quality_counts;
 mod report;
 mod summary;
 
+pub use energy::EnergyMeter;
 pub use frame_counter::{DropCause, DropCounts, FrameCounter, FrameCounts, FrameTicket};
 pub use frame_rate::FrameRateMeter;
 pub use histogram::{Histogram, PassHistograms};

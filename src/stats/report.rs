@@ -19,6 +19,8 @@ pub struct RunInfo {
     pub elapsed_ns: u64,
     /// CPU time of the program meanwhile, in nanoseconds.
     pub cpu_ns: u64,
+    /// Energy of the processor meanwhile, other programs included, in joules; or why it is unknown.
+    pub energy_j: Option<Result<f64, String>>,
     /// The outputs, if there are several.
     pub outputs: Vec<OutputCounts>,
     /// The PipeWire cameras.
@@ -64,6 +66,11 @@ pub struct Report {
     pub elapsed_s: f64,
     /// CPU time of the program meanwhile, all threads together, in seconds.
     pub cpu_s: f64,
+    /// Energy of the processor meanwhile, other programs included, in joules.
+    pub energy_j: Option<f64>,
+    /// Why the energy is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_unknown: Option<String>,
     /// Counts per output, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<OutputCounts>,
@@ -194,6 +201,8 @@ impl Report {
             sink: info.sink,
             elapsed_s: to_ms(info.elapsed_ns) / 1000.0,
             cpu_s: to_ms(info.cpu_ns) / 1000.0,
+            energy_j: info.energy_j.as_ref().and_then(|energy_j| energy_j.as_ref().ok().copied()),
+            energy_unknown: info.energy_j.and_then(Result::err),
             outputs: info.outputs,
             pipewire: info.pipewire,
             window: None,

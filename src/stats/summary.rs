@@ -42,6 +42,9 @@ impl fmt::Display for Report {
                 100.0 * self.blur_reused
             )?;
         }
+        if let Some(energy_j) = self.energy_j.filter(|_| *delivered > 0) {
+            write!(f, "\nenergy of the processor: {:.3} J a frame", energy_j / *delivered as f64)?;
+        }
         // Only outputs that lost frames.
         let mut lossy = self.outputs.iter().filter(|output| output.lost > 0);
         lossy.try_for_each(|output| write!(f, "\n{output}"))?;

@@ -24,6 +24,7 @@ use bokehcam::link::pool::Pooled;
 use bokehcam::look::{BackgroundMemory, Look, Strength};
 use bokehcam::sink::yuyv::Encoder;
 use bokehcam::source::{self, DepthOrigin, Frames, Kind, Source, SourceName};
+use bokehcam::stats::EnergyMeter;
 
 /// Unmeasured frames at the start: caches fill, and the background memory builds up.
 const WARM_UP_FRAMES: u64 = 8;
@@ -68,6 +69,10 @@ struct Chain {
     frames: u32,
     stages: Vec<Stage>,
     levels: Vec<Level>,
+    /// Energy of the processor per frame, all levels together and other programs included, in millijoules.
+    energy_mj: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    energy_unknown: Option<String>,
     /// The finest quality level that sustains each frame rate, `None` if none does.
     affords: Vec<(u32, Option<&'static str>)>,
 }
@@ -200,8 +205,11 @@ fn measure_chain(
         encoder: Encoder::new(),
         yuyv: vec![0; size.0 as usize * size.1 as usize / 2 * 4],
     };
+    let mut energy = EnergyMeter::start();
     for frame in 0..frames {
-        timer.is_recording = frame >= WARM_UP_FRAMES;
+        if frame == WARM_UP_FRAMES {
+            (timer.is_recording, energy) = (true, EnergyMeter::start());
+        }
         if !buffers.process_frame(&mut source, &mut coc, &mut executors, &mut timer)? {
             break;
         }
@@ -209,7 +217,12 @@ fn measure_chain(
     if timer.steps.is_empty() {
         return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
     }
-    Ok(Chain::from_stages(info.name, size, executor, wanted, timer.take_costs()))
+    let mut chain = Chain::from_stages(info.name, size, executor, wanted, timer.take_costs());
+    match energy.joules() {
+        Ok(joules) => chain.energy_mj = Some(1e3 * joules / f64::from(wanted)),
+        Err(reason) => chain.energy_unknown = Some(reason),
+    }
+    Ok(chain)
 }
 
 /// Buffers of one frame, reused for the next.
@@ -298,11 +311,12 @@ impl Chain {
         let levels: Vec<Level> = blurs.iter().map(level).collect();
         let finest = |rate: u32| levels.iter().rev().find(|level| level.frames_per_s >= f64::from(rate));
         let affords = RATES.map(|rate| (rate, finest(rate).map(|level| level.quality))).to_vec();
-        Self { source, size_px, executor, cores, frames, stages: rest, levels, affords }
+        let (energy_mj, energy_unknown) = (None, None);
+        Self { source, size_px, executor, cores, frames, stages: rest, levels, energy_mj, energy_unknown, affords }
     }
 
     fn format_table(&self) -> String {
-        let Self { source, size_px: (width, height), executor, cores, frames, stages, levels, affords } = self;
+        let Self { source, size_px: (width, height), executor, cores, frames, stages, levels, affords, .. } = self;
         let mut text = format!("{source}, {width}x{height}, {frames} frames; {executor}; {cores} cores\n\n");
         text += "thread    stage           processor ms   wall ms\n";
         for Stage { name, thread, cost } in stages.iter().filter(|stage| stage.thread != "sink") {
@@ -321,6 +335,10 @@ impl Chain {
             let _ = writeln!(text, "{quality:<9} {cpu_ms:>12.2} {frames_per_s:>10.1} {share:>21}");
         }
         text.push('\n');
+        let _ = match (self.energy_mj, &self.energy_unknown) {
+            (Some(energy_mj), _) => writeln!(text, "energy of the processor: {energy_mj:.0} mJ a frame, all of the above"),
+            (None, reason) => writeln!(text, "energy of the processor: unknown ({})", reason.as_deref().unwrap_or("?")),
+        };
         for (rate, level) in affords {
             let _ = match level {
                 Some(level) => writeln!(text, "{rate} frames a second: --quality {level}"),
