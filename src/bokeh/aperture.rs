@@ -92,6 +92,10 @@ impl Aperture {
         let mut values = vec![0.0; size * size];
         for (index, value) in values.iter_mut().enumerate() {
             let (left, top) = ((index % size) as f64 * cell - extent, (index / size) as f64 * cell - extent);
+            if let Some(uniform) = self.uniform_transmittance(&outline, (left, top), cell, rim) {
+                *value = uniform;
+                continue;
+            }
             for sample in 0..SUPERSAMPLING * SUPERSAMPLING {
                 let x = left + (0.5 + (sample % SUPERSAMPLING) as f64) * sub;
                 let y = top + (0.5 + (sample / SUPERSAMPLING) as f64) * sub;
@@ -104,6 +108,21 @@ impl Aperture {
             values[size / 2 * size + size / 2] = 1.0;
         }
         Mask { size, extent, values }
+    }
+
+    /// Returns the transmittance of a cell of which all of it is either clear of the rim inside, without a gradient, or
+    /// outside; most cells are.
+    fn uniform_transmittance(&self, outline: &Outline, (left, top): (f64, f64), cell: f64, rim: f64) -> Option<f64> {
+        let (radius, half_diagonal) =
+            ((left + cell / 2.0).hypot(top + cell / 2.0), cell * std::f64::consts::FRAC_1_SQRT_2);
+        let [min, max] = outline.range;
+        match self.shape {
+            Shape::Picture(_) => None,
+            _ if radius - half_diagonal > max + rim / 2.0 => Some(0.0),
+            Shape::Ring { .. } => None,
+            _ if self.intensity == 0.0 && radius + half_diagonal < min - rim / 2.0 => Some(1.0),
+            _ => None,
+        }
     }
 
     /// Returns the transmittance, 0 to 1, at a point in units of the aperture's radius, with a soft edge of width

@@ -41,7 +41,8 @@ impl EnergyMeter {
     /// Returns the reason why it is unknown: no counters, no permission to read them, or a run longer than they last.
     pub fn joules(&self) -> Result<f64, String> {
         let packages = self.packages.as_ref().map_err(Clone::clone)?;
-        let lasts_s = packages.iter().map(|package| package.range_uj as f64).fold(f64::MAX, f64::min) / 1e6 / MAX_POWER_W;
+        let lasts_s =
+            packages.iter().map(|package| package.range_uj as f64).fold(f64::MAX, f64::min) / 1e6 / MAX_POWER_W;
         if self.began.elapsed().as_secs_f64() > lasts_s {
             return Err(format!("the processor's energy counters are only sure to last {:.0} min", lasts_s / 60.0));
         }

@@ -336,7 +336,9 @@ impl Chain {
         }
         text.push('\n');
         let _ = match (self.energy_mj, &self.energy_unknown) {
-            (Some(energy_mj), _) => writeln!(text, "energy of the processor: {energy_mj:.0} mJ a frame, all of the above"),
+            (Some(energy_mj), _) => {
+                writeln!(text, "energy of the processor: {energy_mj:.0} mJ a frame, all of the above")
+            }
             (None, reason) => writeln!(text, "energy of the processor: unknown ({})", reason.as_deref().unwrap_or("?")),
         };
         for (rate, level) in affords {
