@@ -50,9 +50,10 @@ pub const COUNTS: usize = 64;
 pub const RUNS: usize = MAX_STEPS + 1;
 /// Maximum number of storage buffers of a pass.
 pub const MAX_BUFFERS: u32 = 10;
-/// Returns the number of workgroups that loop over `count` entries or cells: no more than any device runs at once.
+/// Returns the number of workgroups that loop over `count` entries or cells: as many as the largest devices run at once,
+/// and few enough that empty ones cost nothing.
 pub fn workgroup_count(count: usize) -> u32 {
-    count.clamp(1, 512) as u32
+    count.clamp(1, 4096) as u32
 }
 
 // `matte_common`, `matte_clusters` and `matte_compare` repeat these as array lengths and bit positions.

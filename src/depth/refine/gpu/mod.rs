@@ -65,7 +65,7 @@ struct Resources {
 const COPIES: usize = 4;
 
 /// Upper bound for the passes of a frame.
-const MAX_PASSES: usize = 48;
+const MAX_PASSES: usize = 80;
 
 impl GpuRefiner {
     /// Creates a refiner on a device, without testing it.

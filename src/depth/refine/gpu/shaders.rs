@@ -47,8 +47,8 @@ pub fn vote_workgroups(pixels: usize) -> [u32; 2] {
     [pixels.div_ceil(64).clamp(1, 2048), pixels.div_ceil(512).clamp(1, 256)].map(|count| count as u32)
 }
 /// Parallel waves per round; one workgroup processes the rest. A wave advances by a pixel, and the band beside edges is
-/// three pixels wide, so that few are left.
-pub const WAVES: usize = 8;
+/// three pixels wide, so that few are left; along an edge, waves may go on.
+pub const WAVES: usize = 24;
 /// Numbers in `counts`: whether a hole is left, and for each round the worklist's length in each wave, and the total
 /// after those.
 pub const COUNTS: usize = 1 + ROUNDS * (WAVES + 2);
