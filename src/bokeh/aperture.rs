@@ -2,7 +2,7 @@
 
 mod outline;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -92,7 +92,8 @@ impl Aperture {
         let mut values = vec![0.0; size * size];
         for (index, value) in values.iter_mut().enumerate() {
             let (left, top) = ((index % size) as f64 * cell - extent, (index / size) as f64 * cell - extent);
-            if let Some(uniform) = self.uniform_transmittance(&outline, (left, top), cell, rim) {
+            let middle = (left + cell / 2.0).hypot(top + cell / 2.0);
+            if let Some(uniform) = self.clear_of_rim(&outline, middle, cell * FRAC_1_SQRT_2, rim) {
                 *value = uniform;
                 continue;
             }
@@ -110,17 +111,15 @@ impl Aperture {
         Mask { size, extent, values }
     }
 
-    /// Returns the transmittance of a cell of which all of it is either clear of the rim inside, without a gradient, or
-    /// outside; most cells are.
-    fn uniform_transmittance(&self, outline: &Outline, (left, top): (f64, f64), cell: f64, rim: f64) -> Option<f64> {
-        let (radius, half_diagonal) =
-            ((left + cell / 2.0).hypot(top + cell / 2.0), cell * std::f64::consts::FRAC_1_SQRT_2);
+    /// Returns the transmittance of all points within `around` of a point at `radius`, if they are clear of the rim in
+    /// every direction, as most are.
+    fn clear_of_rim(&self, outline: &Outline, radius: f64, around: f64, rim: f64) -> Option<f64> {
         let [min, max] = outline.range;
         match self.shape {
             Shape::Picture(_) => None,
-            _ if radius - half_diagonal > max + rim / 2.0 => Some(0.0),
+            _ if radius - around > max + rim / 2.0 => Some(0.0),
             Shape::Ring { .. } => None,
-            _ if self.intensity == 0.0 && radius + half_diagonal < min - rim / 2.0 => Some(1.0),
+            _ if self.intensity == 0.0 && radius + around < min - rim / 2.0 => Some(1.0),
             _ => None,
         }
     }
@@ -132,18 +131,11 @@ impl Aperture {
         if let Shape::Picture(picture) = &self.shape {
             return picture.sample(x, y, rim) * self.radial_intensity(radius.min(1.0));
         }
-        // Most points are clear of the rim in every direction.
-        let [min, max] = outline.range;
-        if radius > max + rim / 2.0 {
-            return 0.0;
+        if let Some(value) = self.clear_of_rim(outline, radius, 0.0, rim) {
+            return value;
         }
-        let is_flat = self.intensity == 0.0 && radius < min - rim / 2.0;
-        let mut value = if is_flat {
-            1.0
-        } else {
-            let edge = outline.radius_towards(x, y);
-            ramp(radius, edge, rim) * self.radial_intensity((radius / edge).min(1.0))
-        };
+        let edge = outline.radius_towards(x, y);
+        let mut value = ramp(radius, edge, rim) * self.radial_intensity((radius / edge).min(1.0));
         if let Shape::Ring { inner } = self.shape
             && inner > 0.0
         {
