@@ -206,7 +206,7 @@ impl Bokeh for GpuBokeh {
             None => self.device.upload(color, 0, &job.color.rgb),
         }
         if let Some(metres) = shared_metres {
-            recorder.encoder.copy_buffer_to_buffer(metres, 0, &self.metres, 0, metres.size().min(self.metres.size()));
+            recorder.encoder.copy_buffer_to_buffer(metres, 0, &self.metres, 0, metres.size());
         }
         self.passes.record(&mut recorder, &self.plan, &self.layout);
         let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);

@@ -59,9 +59,10 @@ impl BackgroundMemory {
         let seen = Comparison { memory: self, metres: &map.metres, surface_step, block_px: block_px(color.width) };
         for y in (0..height).step_by(STEP) {
             // Beyond the picture, the row itself stands in: it has no step to itself.
-            let row = |y: usize| &map.metres[(if y < height { y } else { y - BESIDE_PX }) * width..][..width];
             let above = y.checked_sub(BESIDE_PX).unwrap_or(y);
-            Arch::new().dispatch(FindSteps { rows: [row(above), row(y), row(y + BESIDE_PX)], steps: &mut steps });
+            let below = Some(y + BESIDE_PX).filter(|&below| below < height).unwrap_or(y);
+            let rows = [above, y, below].map(|y| &map.metres[y * width..][..width]);
+            Arch::new().dispatch(FindSteps { rows, steps: &mut steps });
             for x in (0..width).step_by(STEP).filter(|&x| steps[x] > MIN_STEP * surface_step) {
                 seen.collect_evidence((x, y), &mut cell_evidence[y / CELL * across + x / CELL]);
             }

@@ -169,12 +169,8 @@ fn measure_chain(
     if timer.steps.is_empty() {
         return Err(CliError::Usage(format!("--chain: {name} has too few frames to measure")));
     }
-    let mut chain = Chain::from_stages(info.name, size, executor, wanted, timer.take_costs());
-    match energy.joules() {
-        Ok(joules) => chain.energy_mj = Some(1e3 * joules / f64::from(wanted)),
-        Err(reason) => chain.energy_unknown = Some(reason),
-    }
-    Ok(chain)
+    let energy_mj = energy.joules().map(|joules| 1e3 * joules / f64::from(wanted));
+    Ok(Chain::new((info.name, size, executor, wanted), timer.take_costs(), energy_mj))
 }
 
 /// Buffers of one frame, reused for the next.

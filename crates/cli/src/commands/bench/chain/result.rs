@@ -48,21 +48,19 @@ pub(super) struct Chain {
     stages: Vec<Stage>,
     levels: Vec<Level>,
     /// Energy of the processor per frame, all levels together and other programs included, in millijoules.
-    pub(super) energy_mj: Option<f64>,
+    energy_mj: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) energy_unknown: Option<String>,
+    energy_unknown: Option<String>,
     /// The finest quality level that sustains each frame rate, `None` if none does.
     affords: Vec<(u32, Option<&'static str>)>,
 }
 
 impl Chain {
     /// Sums up the stages, of which those of the thread `blur` are the quality levels.
-    pub(super) fn from_stages(
-        source: String,
-        size_px: (u32, u32),
-        executor: String,
-        frames: u32,
+    pub(super) fn new(
+        (source, size_px, executor, frames): (String, (u32, u32), String, u32),
         mut stages: Vec<Stage>,
+        energy_mj: Result<f64, String>,
     ) -> Self {
         let (blurs, rest) = stages.drain(..).partition::<Vec<_>, _>(|stage| stage.thread == "blur");
         let cores = core_count();
@@ -80,7 +78,10 @@ impl Chain {
         let levels: Vec<Level> = blurs.iter().map(level).collect();
         let finest = |rate: u32| levels.iter().rev().find(|level| level.frames_per_s >= f64::from(rate));
         let affords = RATES.map(|rate| (rate, finest(rate).map(|level| level.quality))).to_vec();
-        let (energy_mj, energy_unknown) = (None, None);
+        let (energy_mj, energy_unknown) = match energy_mj {
+            Ok(energy_mj) => (Some(energy_mj), None),
+            Err(reason) => (None, Some(reason)),
+        };
         Self { source, size_px, executor, cores, frames, stages: rest, levels, energy_mj, energy_unknown, affords }
     }
 
