@@ -13,7 +13,7 @@ mod texts;
 
 pub use calibrations::{calibration, depth_calibration};
 pub use camera::{mjpeg, raw_pixels};
-pub use pictures::{pfm, picture, snapshot};
+pub use pictures::{depth_map, picture, snapshot};
 pub use recordings::recording;
 pub use texts::{command_line, settings};
 
@@ -26,7 +26,7 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("command_line", command_line),
     ("depth_calibration", depth_calibration),
     ("mjpeg", mjpeg),
-    ("pfm", pfm),
+    ("depth_map", depth_map),
     ("picture", picture),
     ("raw_pixels", raw_pixels),
     ("recording", recording),

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
-use bokehcam::recording::still::{self, Map};
-use bokehcam::recording::{PhotoMetadata, snapshot as snapshots};
+use bokehcam::recording::depth_file::{self, DepthUnit, Fit, Options};
+use bokehcam::recording::{PhotoMetadata, snapshot as snapshots, still};
 
 use super::input::{assert_one_line, file_path, write_file};
 
@@ -37,19 +37,28 @@ pub fn picture(data: &[u8]) {
     }
 }
 
-/// Reads a PFM as depth and as disparity.
-pub fn pfm(data: &[u8]) {
-    let path = write_file("map.pfm", data);
+/// Reads a depth map in any format as depth and as disparity.
+pub fn depth_map(data: &[u8]) {
+    let path = write_file("map", data);
     check_maps(&path);
 }
 
 /// Reads a file as depth and as disparity.
 fn check_maps(path: &Path) {
-    for depth_scale in [None, Some(1000.0)] {
-        match still::read_map(path, depth_scale, Some(7)) {
-            Ok(Map::Depth(depth)) => assert_depth(&depth),
-            Ok(Map::Disparity(disparity, _)) => assert_disparity(&disparity),
-            Err(error) => assert_one_line(error),
+    for unit in [None, Some(DepthUnit::PerMetre(1000.0)), Some(DepthUnit::Inverse), Some(DepthUnit::Disparity)] {
+        for fit in [Fit::Stretch, Fit::Crop] {
+            let options = Options { unit, fit: Some(fit), invalid: Some(7.0), ..Options::default() };
+            match depth_file::read(path, &options, (40, 30)) {
+                Ok(file) => {
+                    assert_depth(&file.map);
+                    assert!(
+                        depth_file::covers(file.map.size(), (40, 30))
+                            || fit == Fit::Stretch
+                            || file.map.size() < (9, 9)
+                    );
+                }
+                Err(error) => assert_one_line(error),
+            }
         }
     }
     match still::read_depth(path, 5000.0, None) {

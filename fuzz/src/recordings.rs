@@ -39,11 +39,8 @@ pub fn recording(data: &[u8]) {
         keep_going: flags & 1 != 0,
         pair_tolerance_ns: if flags & 2 != 0 { u64::MAX } else { 20_000_000 },
         depth_scale: if flags & 4 != 0 { 1e-38 } else { 5000.0 },
-        depth_unit: match flags & 48 {
-            16 => DepthUnit::Inverse { white_is_far: false },
-            48 => DepthUnit::Inverse { white_is_far: true },
-            _ => DepthUnit::Metres,
-        },
+        depth_unit: if flags & 16 != 0 { DepthUnit::Inverse } else { DepthUnit::Metres },
+        depth_invert: flags & 32 != 0,
         depth_invalid: (flags & 8 != 0).then_some(65535),
     };
     match Recording::open(&file_path(folder), &options) {

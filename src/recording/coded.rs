@@ -181,11 +181,7 @@ pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFa
 
 /// Opens a regular file and detects its format by the first bytes; `None` if unsupported. The file is rewound.
 fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
-    let mut file = input::open(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
-        ErrorKind::InvalidInput => PictureFault::NotAFile,
-        _ => PictureFault::Io(error),
-    })?;
+    let mut file = input::open(path).map_err(open_fault)?;
     let mut start = [0; 8];
     let mut length = 0;
     while let read @ 1.. = file.read(&mut start[length..])? {
@@ -200,6 +196,15 @@ fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
         _ => return Ok((file, None)),
     };
     Ok((file, Some(format)))
+}
+
+/// Returns the fault of a file that cannot be opened.
+pub(super) fn open_fault(error: std::io::Error) -> PictureFault {
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
+        ErrorKind::InvalidInput => PictureFault::NotAFile,
+        _ => PictureFault::Io(error),
+    }
 }
 
 fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
-use super::{Options, StereoGeometry, Unpaired};
+use super::{DepthUnit, Options, StereoGeometry, Unpaired};
 use crate::optics::StereoRig;
 
 /// A recording layout: its detection and its reader.
@@ -53,6 +53,18 @@ pub(super) enum DepthFormat {
     },
     /// Disparities in a PFM; the rig belongs to the colour pictures at their size.
     Disparity(StereoRig),
+}
+
+impl DepthFormat {
+    /// Returns the format of depth pictures that are read with `options`.
+    pub(super) fn of_pictures(options: &Options) -> Self {
+        let scaled = |scale| Self::Units(DepthUnits { scale, invalid: options.depth_invalid });
+        match options.depth_unit {
+            DepthUnit::Inverse => Self::Inverse { white_is_far: options.depth_invert },
+            DepthUnit::PerMetre(scale) => scaled(scale),
+            DepthUnit::Metres | DepthUnit::Disparity => scaled(options.depth_scale),
+        }
+    }
 }
 
 /// The folder of a recording.

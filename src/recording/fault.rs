@@ -148,8 +148,8 @@ pub enum PictureFault {
     },
     /// A depth map does not cover its colour picture.
     #[error(
-        "the depth map is {}x{}, which does not cover a colour picture of {}x{}; \
-         export it at that size, or smaller with the same aspect",
+        "the depth map is {}x{}, which does not cover a colour picture of {}x{}; if both show the same view, add \
+         --depth-fit stretch, and if the picture is the middle of the map, --depth-fit crop",
         found.0, found.1, color.0, color.1
     )]
     DepthSize {
@@ -178,12 +178,31 @@ pub enum PictureFault {
     /// The picture contains no settings.
     #[error("not a snapshot: it contains no settings of bokehcam; give a snapshot, or the settings themselves")]
     NoSettings,
-    /// An 8-bit grey picture: too few steps, and unknown polarity.
+    /// An 8-bit grey picture: its polarity and unit are unknown.
     #[error(
-        "an 8-bit grey picture has too few steps for depth; export it with 16 bits (dark is near, 0 is unknown). If \
-         white is near (inverse depth, as from networks and phones), use --depth-unit inverse"
+        "an 8-bit grey picture does not say what its 256 steps mean; add --depth-unit inverse if white is near (networks, \
+         phones), --depth-unit inverse --depth-invert if black is near, or --depth-unit scale:N for distances of N steps \
+         a metre"
     )]
     CoarseDepth,
+    /// The numbers may be distances or nearness.
+    #[error(
+        "it has {0}; add --depth-unit inverse if large values (white) are near, --depth-unit inverse --depth-invert if \
+         they are far, or for distances --depth-unit metres, millimetres or scale:N"
+    )]
+    UnclearDepth(&'static str),
+    /// Nothing in the depth map is usable.
+    #[error("{0}; export the depth map again")]
+    NoDepth(&'static str),
+    /// The file does not hold one number per pixel.
+    #[error("{0} is not a map; export one number per pixel")]
+    NotAMap(String),
+    /// Colours stand for depth.
+    #[error(
+        "a picture in colours is not depth, as colours have no order; export grey or numbers from the depth tool (such as \
+         --grayscale, --pred-only, cmap=\"gray\", or .npy)"
+    )]
+    ColoredDepth,
     /// The picture is not a depth map.
     #[error(
         "{0} is not depth; export depth as a 16-bit grey PNG; for inverse depth, where white is near, use --depth-unit \

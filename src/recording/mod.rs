@@ -3,6 +3,7 @@
 //! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
 //! `euroc` and `middlebury` can be read, and are stereo.
 
+pub mod depth_file;
 pub mod geometry;
 pub mod snapshot;
 pub mod still;
@@ -32,6 +33,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 pub use decode::Scratch;
+pub use depth_file::{DepthUnit, covers as depth_covers};
 pub use error::RecordingError;
 pub use fault::{GeometryFault, LineFault, PictureFault};
 pub use photo_metadata::PhotoMetadata;
@@ -48,26 +50,15 @@ const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middleb
 /// largest takes at most four times the 192 MiB of its RGB.
 const MAX_SIDE_PX: u32 = 8192;
 
-/// The meaning of the values in depth pictures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DepthUnit {
-    /// Distances, in 16 bits.
-    #[default]
-    Metres,
-    /// Relative inverse depth, in grey pictures of any kind, from 0 to the largest value.
-    Inverse {
-        /// Whether white is the farthest instead of the nearest.
-        white_is_far: bool,
-    },
-}
-
 /// Options for reading a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Units of the depth pictures per metre, > 0.
     pub depth_scale: f32,
-    /// The meaning of the values in depth pictures.
+    /// The meaning of the values in depth pictures: distances, or relative inverse depth from 0 to the largest value.
     pub depth_unit: DepthUnit,
+    /// Whether white is the farthest in relative inverse depth, instead of the nearest.
+    pub depth_invert: bool,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
     /// Largest time difference between a colour picture and its depth map or right picture, in nanoseconds.
@@ -83,6 +74,7 @@ impl Default for Options {
         Self {
             depth_scale: tum::DEPTH_SCALE,
             depth_unit: DepthUnit::Metres,
+            depth_invert: false,
             depth_invalid: None,
             pair_tolerance_ns: 20_000_000,
             keep_going: false,
@@ -321,17 +313,6 @@ fn read_first_size<'a>(
         }
     }
     Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: folder.dir.clone() }))
-}
-
-/// Returns whether a depth map of this size covers the view of a colour picture: it is not larger and has the same
-/// aspect ratio, within a pixel.
-pub fn depth_covers(depth: (u32, u32), color: (u32, u32)) -> bool {
-    let (depth_width, depth_height) = (u64::from(depth.0), u64::from(depth.1));
-    let (width, height) = (u64::from(color.0), u64::from(color.1));
-    // Compare the aspect ratios by cross-multiplication: one pixel of the depth map changes them by at most the longer
-    // colour side.
-    let skew = (depth_width * height).abs_diff(depth_height * width);
-    (1..=width).contains(&depth_width) && (1..=height).contains(&depth_height) && skew <= width.max(height)
 }
 
 fn check_depth_scale(depth_scale: f32) -> Result<(), RecordingError> {

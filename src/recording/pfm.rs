@@ -16,14 +16,6 @@ pub(super) fn is_pfm_path(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
-/// Reads the values as stored, with 0 for unknown, and their meaning if the file states it.
-pub(super) fn read_pfm(path: &Path) -> Result<(DepthMap, Option<MapUnit>), PictureFault> {
-    let mut map = DepthMap::default();
-    let ((width, height), map_unit) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
-    (map.width, map.height) = (width, height);
-    Ok((map, map_unit))
-}
-
 /// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` (columns, rows) pixels,
 /// whose view the disparity map must cover.
 pub(super) fn read_disparity_as_depth(
@@ -46,42 +38,56 @@ pub(super) fn read_disparity_as_depth(
     Ok(())
 }
 
-/// Parses a PFM into `values`, top row first, with 0 for unknown. Returns width and height, and the meaning if the file
-/// states it.
-fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<MapUnit>), PictureFault> {
+/// Parses a PFM into `values` as stored, top row first. Returns width and height, and the meaning if the file states it.
+/// Colours are accepted if they are grey.
+pub(super) fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<MapUnit>), PictureFault> {
     let mut rest = bytes;
-    let magic = parse_word(&mut rest)?;
-    if magic != "Pf" {
-        return Err(if magic == "PF" {
-            PictureFault::NotDepth("a colour PFM")
-        } else {
-            PictureFault::Format("grey PFM")
-        });
-    }
-    let width = parse_number(parse_word(&mut rest)?)?;
-    let height = parse_number(parse_word(&mut rest)?)?;
+    let channels = match parse_word(&mut rest)?.0 {
+        "Pf" => 1,
+        "PF" => 3,
+        _ => return Err(PictureFault::Format("grey PFM")),
+    };
+    let (width, after_width) = parse_word(&mut rest)?;
+    let width = parse_number(width)?;
+    let height = parse_number(parse_word(&mut rest)?.0)?;
     check_size(width, height)?;
     // Only the sign is used: negative is little-endian.
-    let scale_text = parse_word(&mut rest)?;
+    let scale_text = parse_word(&mut rest)?.0;
     let scale: f32 = parse_number(scale_text)?;
-    let row_bytes = width as usize * 4;
+    let row_bytes = width as usize * 4 * channels;
     let data = rest.get(..row_bytes * height as usize).ok_or(PictureFault::Truncated)?;
 
     let from_bytes = if scale < 0.0 { f32::from_le_bytes } else { f32::from_be_bytes };
-    let rows = data.chunks_exact(row_bytes).rev();
-    let read = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
+    let numbers = |row: &[u8]| row.as_chunks().0.iter().map(|&bytes| from_bytes(bytes)).collect::<Vec<f32>>();
     values.clear();
-    values.extend(read.map(|value| if DepthMap::is_known(value) { value } else { 0.0 }));
+    values.reserve(width as usize * height as usize);
+    for row in 0..height as usize {
+        // Photoshop writes width and height on a line each, and the top row first.
+        let stored = if after_width == b'\n' { row } else { height as usize - 1 - row };
+        let numbers = numbers(&data[stored * row_bytes..][..row_bytes]);
+        if channels == 1 {
+            values.extend(numbers);
+            continue;
+        }
+        let is_grey =
+            |pixel: &[f32; 3]| pixel[0].to_bits() == pixel[1].to_bits() && pixel[1].to_bits() == pixel[2].to_bits();
+        let pixels = numbers.as_chunks::<3>().0;
+        if !pixels.iter().all(is_grey) {
+            return Err(PictureFault::NotDepth("a colour PFM"));
+        }
+        values.extend(pixels.iter().map(|pixel| pixel[0]));
+    }
     Ok(((width, height), MapUnit::from_pfm_scale(scale_text)))
 }
 
-/// Reads the next word of the header. Exactly one white space ends it, since pixels may follow.
-fn parse_word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
+/// Reads the next word of the header, and the one white space that ends it, since pixels may follow.
+fn parse_word<'a>(rest: &mut &'a [u8]) -> Result<(&'a str, u8), PictureFault> {
     let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(PictureFault::Truncated)?;
     let length = rest[start..].iter().position(u8::is_ascii_whitespace).ok_or(PictureFault::Truncated)?;
-    let word = &rest[start..start + length];
+    let (word, end) = (&rest[start..start + length], rest[start + length]);
     *rest = &rest[start + length + 1..];
-    std::str::from_utf8(word).map_err(|_| PictureFault::Damaged("its header is not text".into()))
+    let word = std::str::from_utf8(word).map_err(|_| PictureFault::Damaged("its header is not text".into()))?;
+    Ok((word, end))
 }
 
 fn parse_number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {

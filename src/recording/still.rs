@@ -6,15 +6,15 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use image::metadata::Orientation;
-use image::{DynamicImage, ImageBuffer, Luma, RgbImage, imageops};
+use image::{DynamicImage, RgbImage};
 
-use super::decode::{self, DepthUnits, Scratch};
+use super::decode::{self, Scratch};
+use super::depth_file::{self, Distances};
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::photo_metadata::PhotoMetadata;
-use super::unit::{self, MapUnit};
-use super::{check_depth_scale, coded, depth_covers, encode, pfm, tum};
+use super::unit::MapUnit;
+use super::{check_depth_scale, depth_covers, encode, pfm};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
@@ -46,59 +46,6 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingE
     Ok((ColorImage { width, height, rgb: upright.into_bytes() }, metadata))
 }
 
-/// The content of a map file.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Map {
-    /// Metres.
-    Depth(DepthMap),
-    /// In pixels, with the stereo rig if the file states it.
-    Disparity(DisparityMap, Option<StereoRig>),
-}
-
-/// Reads a map from a 16-bit grey PNG, where 0 and `invalid` mean unknown, or from a `.pfm`. Metadata in the file
-/// decides quantity and unit, as written by [`write_depth`] and [`write_disparity`]. A file without them is depth, in
-/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, overrides both. A PNG is
-/// rotated upright by its orientation tag. At most 8192 x 8192 pixels.
-///
-/// # Errors
-/// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, truncated or damaged; the
-/// scale is not a number > 0.
-pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> Result<Map, RecordingError> {
-    let fault = || RecordingError::picture(path);
-    depth_scale.map_or(Ok(()), check_depth_scale)?;
-    let (map, map_unit) = if pfm::is_pfm_path(path) {
-        pfm::read_pfm(path).map_err(fault())?
-    } else {
-        let info = coded::read_png_info(path).ok();
-        let text = info.as_ref().and_then(|info| {
-            let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == unit::KEYWORD)?;
-            MapUnit::from_text(&chunk.text)
-        });
-        let scale = match (depth_scale, text) {
-            (_, Some(MapUnit::Disparity { .. })) => unit::DISPARITY_SCALE,
-            (Some(given), Some(MapUnit::Depth { per_m })) if given != per_m => {
-                let file = path.display();
-                tracing::warn!("{file}: states {per_m} units per metre, but is read with {given}, as requested");
-                given
-            }
-            (Some(given), _) => given,
-            (None, Some(MapUnit::Depth { per_m })) => per_m,
-            (None, None) => tum::DEPTH_SCALE,
-        };
-        let orientation = info.as_ref().map(|info| PhotoMetadata::from_png(info).take_orientation());
-        let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
-        let units = DepthUnits { scale, invalid };
-        decode::read_depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
-        (apply_orientation(depth, orientation.unwrap_or(Orientation::NoTransforms)), text)
-    };
-    Ok(match map_unit {
-        Some(MapUnit::Disparity { rig }) => {
-            Map::Disparity(DisparityMap { width: map.width, height: map.height, px: map.metres }, rig)
-        }
-        _ => Map::Depth(map),
-    })
-}
-
 /// Checks that the depth map `path` of `depth` (columns, rows) pixels covers a picture of `color` pixels.
 ///
 /// # Errors
@@ -121,62 +68,30 @@ pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Resu
     }
 }
 
-/// Rotates a map by its orientation tag.
-fn apply_orientation(map: DepthMap, orientation: Orientation) -> DepthMap {
-    let DepthMap { width, height, metres, .. } = map;
-    let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
-    let image = match orientation {
-        Orientation::NoTransforms => image,
-        Orientation::Rotate90 => imageops::rotate90(&image),
-        Orientation::Rotate180 => imageops::rotate180(&image),
-        Orientation::Rotate270 => imageops::rotate270(&image),
-        Orientation::FlipHorizontal => imageops::flip_horizontal(&image),
-        Orientation::FlipVertical => imageops::flip_vertical(&image),
-        Orientation::Rotate90FlipH => imageops::flip_horizontal(&imageops::rotate90(&image)),
-        Orientation::Rotate270FlipH => imageops::flip_horizontal(&imageops::rotate270(&image)),
-    };
-    DepthMap { width: image.width(), height: image.height(), metres: image.into_raw(), ..DepthMap::default() }
-}
-
-/// Reads a depth map in metres, as [`read_map`]. Disparity is converted to depth if the file states the stereo rig.
+/// Reads a depth map in metres in its own size, in a format of [`depth_file::read`]. `depth_scale` is for whole numbers,
+/// in units per metre.
 ///
 /// # Errors
-/// Same as for [`read_map`]; or the file holds disparity without a stereo rig.
+/// The file is missing, of another kind, too large, truncated or damaged; its distances are only relative; the scale is
+/// not a number > 0.
 pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
-    match read_map(path, Some(depth_scale), invalid)? {
-        Map::Depth(map) => Ok(map),
-        Map::Disparity(map, Some(rig)) => Ok(map.to_depth_map(|px| rig.depth_m(px))),
-        Map::Disparity(_, None) => Err(RecordingError::picture(path)(PictureFault::NotDepth("disparity"))),
-    }
+    check_depth_scale(depth_scale)?;
+    let (scale, invalid) = (Some(depth_scale), invalid.map(f32::from));
+    let options = depth_file::Options { scale, invalid, ..depth_file::Options::default() };
+    let read = depth_file::read_unfitted(path, &options).and_then(|file| match file.distances {
+        Distances::Relative => Err(PictureFault::NotDepth("disparity")),
+        Distances::Scaled | Distances::Metres => Ok(file.map),
+    });
+    read.map_err(RecordingError::picture(path))
 }
 
-/// Reads relative inverse depth for a picture of `color` pixels: grey, 8 or 16 bits, white is near unless
-/// `white_is_far`. The distances are relative to the nearest one.
-///
-/// # Errors
-/// Same as for [`read_color`]; or the file is not grey, or does not cover the picture.
-pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) -> Result<DepthMap, RecordingError> {
-    let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
-    let read = decode::read_inverse_depth(path, white_is_far, color, &mut scratch, &mut map);
-    read.map(|()| map).map_err(RecordingError::picture(path))
-}
-
-/// Reads a disparity map in pixels from a `.pfm`, or from a 16-bit grey PNG of 256 units per pixel, where 0 is unknown
-/// (KITTI). At most 8192 x 8192 pixels.
+/// Reads a disparity map in pixels from a file of floats, or from a 16-bit grey PNG of 256 units per pixel, where 0 is
+/// unknown (KITTI). At most 8192 x 8192 pixels.
 ///
 /// # Errors
 /// Same as for [`read_depth`].
 pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
-    let map = match pfm::is_pfm_path(path) {
-        true => pfm::read_pfm(path).map(|(map, _)| map),
-        false => {
-            let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
-            let units = DepthUnits { scale: unit::DISPARITY_SCALE, invalid: None };
-            decode::read_depth(path, units, None, &mut scratch, &mut map).map(|()| map)
-        }
-    };
-    let map = map.map_err(RecordingError::picture(path))?;
-    Ok(DisparityMap { width: map.width, height: map.height, px: map.metres })
+    depth_file::read_disparity(path).map_err(RecordingError::picture(path))
 }
 
 /// Reads a PNG or JPEG as width, height and grey values, row-major, 0 to 1 as stored (not linearised): luma for a

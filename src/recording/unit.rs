@@ -36,6 +36,11 @@ impl MapUnit {
         }
     }
 
+    /// Returns the stereo rig, if it is stated.
+    pub(super) fn rig(&self) -> Option<StereoRig> {
+        if let Self::Disparity { rig } = self { *rig } else { None }
+    }
+
     /// Parses the text of a PNG; `None` if it is not ours, or has invalid values.
     pub(super) fn from_text(text: &str) -> Option<Self> {
         let mut words = text.split_ascii_whitespace();

@@ -48,7 +48,7 @@ use crate::frame::DepthMap;
 use crate::look::{Effect, Look, SourceDepth, Strength};
 use crate::optics::StereoRig;
 use crate::pipeline::{BlurSetup, Run};
-use crate::recording::{Options as Reading, Recording, Scratch};
+use crate::recording::{DepthUnit, Options as Reading, Recording, Scratch};
 use crate::sink::Sink;
 
 /// The origin of depth.
@@ -101,6 +101,8 @@ pub struct Source {
     pub guide: Option<Arc<Guide>>,
     /// The first map of recorded depth, if the look uses depth.
     pub first_depth: Option<DepthMap>,
+    /// What was assumed about its files, a line each.
+    pub notes: Vec<String>,
 }
 
 /// Options for opening a source.
@@ -156,7 +158,17 @@ impl Source {
     pub fn from_camera(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().frame_data == FrameData::Depth;
         let depth_from = if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing };
-        Self { camera, depth, rig: None, depth_from, networks: None, persons: None, guide: None, first_depth: None }
+        Self {
+            camera,
+            depth,
+            rig: None,
+            depth_from,
+            networks: None,
+            persons: None,
+            guide: None,
+            first_depth: None,
+            notes: Vec::new(),
+        }
     }
 
     /// Opens a source with its own depth: recorded, exact, or matched. Depth from another device or recording is added
@@ -201,8 +213,8 @@ impl Source {
             let depth_from = DepthOrigin::Stereo;
             return Ok(Self { rig: Some(rig), depth_from, ..Self::from_camera(source.camera, depth) });
         }
-        let Opened { camera, depth, first_depth, .. } = source;
-        Ok(Self { depth_from, first_depth, ..Self::from_camera(camera, depth) })
+        let Opened { camera, depth, first_depth, notes, .. } = source;
+        Ok(Self { depth_from, first_depth, notes, ..Self::from_camera(camera, depth) })
     }
 
     /// Returns whether its frames have depth.
@@ -233,15 +245,22 @@ impl Source {
 
 impl OpenRequest<'_> {
     /// Returns the options for reading a recording with depth pictures.
-    fn recording_options(&self) -> Reading {
+    fn recording_options(&self) -> Result<Reading, SourceError> {
         let Options { depth, keep_going, .. } = self.options;
-        Reading {
+        let depth_unit = depth.depth_unit.unwrap_or(DepthUnit::Metres);
+        if depth_unit == DepthUnit::Disparity {
+            return SourceError::usage_error(
+                "--depth-unit disparity is for the depth map of a photo, not for recordings",
+            );
+        }
+        Ok(Reading {
             depth_scale: depth.file_scale(),
-            depth_unit: depth.file_unit(),
+            depth_unit,
+            depth_invert: depth.depth_invert,
             depth_invalid: Some(depth.depth_invalid),
             keep_going: *keep_going,
             ..Reading::default()
-        }
+        })
     }
 
     /// Returns whether the effect uses depth.

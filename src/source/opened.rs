@@ -25,6 +25,7 @@ use crate::depth::recorded::RecordedDepth;
 use crate::frame::DepthMap;
 #[cfg(feature = "camera")]
 use crate::layout::Content;
+use crate::recording::depth_file::describe_stretch;
 use crate::recording::{Recording, StereoGeometry};
 #[cfg(feature = "camera")]
 use crate::v4l2::live::ModeRequest;
@@ -40,6 +41,8 @@ pub(super) struct Opened {
     pub depth: Option<Box<dyn DepthSource>>,
     pub depth_from: DepthOrigin,
     pub first_depth: Option<DepthMap>,
+    /// What was assumed about the files, a line each.
+    pub notes: Vec<String>,
     /// The stereo geometry that the source states.
     pub pair: StereoGeometry,
     /// The number of disparities, if a recording states it.
@@ -55,6 +58,7 @@ impl Opened {
             depth: None,
             depth_from: DepthOrigin::Nothing,
             first_depth: None,
+            notes: Vec::new(),
             pair: StereoGeometry::Uncalibrated,
             disparities: None,
         };
@@ -67,7 +71,7 @@ impl Opened {
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &request.recording_options())?);
+                let recording = Arc::new(Recording::open(folder, &request.recording_options()?)?);
                 let name = folder.display().to_string();
                 let part = PlayRange {
                     start_s: frames.start.unwrap_or(0.0),
@@ -84,6 +88,8 @@ impl Opened {
                 let depth_from = recorded_depth_origin(&recording);
                 request.check_relative_depth(depth_from)?;
                 let first_depth = request.read_first_depth(&recording);
+                let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
+                let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
@@ -92,17 +98,19 @@ impl Opened {
                     depth,
                     depth_from,
                     first_depth,
+                    notes,
                     pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
                     disparities,
                     ..without_depth(Box::new(camera))
                 })
             }
             SourceName::Photo(path) => {
-                let (color, map, depth_from) = photo::read_photo(path, request.options)?;
+                let photo::ReadPhoto { color, depth: map, depth_from, notes } =
+                    photo::read_photo(path, request.options)?;
                 request.check_relative_depth(depth_from)?;
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
                 let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
-                Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
+                Ok(Self { depth, depth_from, notes, ..without_depth(Box::new(camera)) })
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {

@@ -17,7 +17,10 @@ use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 use crate::depth::stereo::Settings;
 #[cfg(feature = "clap")]
 use crate::look::number::{in_range_parser, parse_positive};
+#[cfg(feature = "clap")]
 use crate::names;
+use crate::recording::DepthUnit;
+use crate::recording::depth_file::{self, Fit};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 pub use single_camera::{NetworkFile, Networks, PlateFile, SingleCameraDepth};
@@ -74,18 +77,23 @@ pub struct Depth {
     /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = parse_positive))]
     pub depth_scale: Option<f32>,
-    /// Value of a depth picture that means unknown
+    /// Value of a depth picture that means unknown, besides 0
     #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "0"))]
     pub depth_invalid: u16,
-    /// Meaning of the values in depth pictures: metres (scaled by --depth-scale), or inverse (relative inverse depth,
-    /// as from networks and phones: 8 or 16 bits, PNG or JPEG, white is near)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT", value_parser = parse_depth_unit, default_value = "metres"))]
-    pub depth_unit: DepthUnit,
-    /// In pictures of inverse depth, white is far
+    /// Meaning of the values in depth pictures: metres (scaled by --depth-scale), millimetres, scale:N (N units per
+    /// metre), inverse (relative inverse depth, as from networks and phones: the largest values, white, are near) or
+    /// disparity (of a photo's map) [default: what a photo's map states or unmistakably is; metres in recordings]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
+    pub depth_unit: Option<DepthUnit>,
+    /// In inverse depth, the largest values (white) are far
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub depth_invert: bool,
+    /// Fit of a photo's depth map with another aspect ratio: stretch (both show the same view) or crop (the photo is the
+    /// middle of the map) [default: stretch up to 2 %, and squares]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HOW", value_parser = names::parse_name::<Fit>))]
+    pub depth_fit: Option<Fit>,
     /// Position of the depth camera relative to the colour camera: TOML with the tables [depth] and [color] (width,
     /// height, fx, fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3
     /// numbers) [default: both have the same view]
@@ -93,23 +101,15 @@ pub struct Depth {
     pub depth_calibration: Option<PathBuf>,
 }
 
-names::named! {
-    /// What the numbers of a depth picture are.
-    pub enum DepthUnit default Metres {
-        /// Distances
-        Metres = "metres",
-        /// Relative inverse depth
-        Inverse = "inverse",
-    }
-}
-
 impl Depth {
-    /// Returns the meaning of the values in depth files.
-    pub fn file_unit(&self) -> crate::recording::DepthUnit {
-        use crate::recording::DepthUnit as Unit;
-        match self.depth_unit {
-            DepthUnit::Metres => Unit::Metres,
-            DepthUnit::Inverse => Unit::Inverse { white_is_far: self.depth_invert },
+    /// Returns how to read the depth map of a photo.
+    pub fn of_photo(&self) -> depth_file::Options {
+        depth_file::Options {
+            unit: self.depth_unit,
+            invert: self.depth_invert,
+            scale: self.depth_scale,
+            invalid: Some(f32::from(self.depth_invalid)),
+            fit: self.depth_fit,
         }
     }
 
@@ -245,15 +245,6 @@ fn parse_control(text: &str) -> Result<Setting, String> {
         .filter(|(name, _)| !name.is_empty())
         .ok_or_else(|| "use NAME=VALUE, such as exposure_dynamic_framerate=0".to_string())?;
     Ok((name.to_owned(), value.to_owned()))
-}
-
-#[cfg(feature = "clap")]
-fn parse_depth_unit(text: &str) -> Result<DepthUnit, String> {
-    names::parse_name(text).map_err(|accepted| match text {
-        "mm" | "millimetres" | "millimeters" => format!("{accepted}; for millimetres, use --depth-scale 1000"),
-        "disparity" => format!("{accepted}; disparity written by bokehcam needs no unit"),
-        _ => accepted,
-    })
 }
 
 #[cfg(feature = "clap")]

@@ -4,15 +4,18 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::options::Depth;
 use super::{DepthChoice, DepthOrigin, Options, Source, SourceError, SourceName};
 use crate::depth::FrameInput;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
-use crate::optics::StereoRig;
-use crate::recording::{DepthUnit, snapshot, still, still::Map};
+use crate::recording::depth_file::{self, DepthFile, Distances};
+use crate::recording::{snapshot, still};
 
-/// Suffixes of depth files, after the photo's stem. The first is that of snapshots.
-const DEPTH: [&str; 4] = ["-depth.pfm", "-depth.png", ".depth.pfm", ".depth.png"];
+/// Suffixes of depth files, after the photo's stem and before [`EXTENSIONS`].
+const DEPTH: [&str; 2] = ["-depth", ".depth"];
+/// Extensions of depth files. The first is that of snapshots.
+const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp"];
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
@@ -39,6 +42,8 @@ pub struct PhotoDepth {
     pub measured: bool,
     /// A short description of its source.
     pub by: String,
+    /// What was assumed about it, a line each.
+    pub notes: Vec<String>,
 }
 
 /// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it.
@@ -53,13 +58,13 @@ pub fn read_default_depth(
 ) -> Result<Option<PhotoDepth>, SourceError> {
     let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
     let measured = source.is_measured();
-    let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok(None) };
+    let Source { depth: Some(depth), depth_from: from, networks, notes, .. } = &mut source else { return Ok(None) };
     let mut map = DepthMap::default();
     depth
         .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
     let describe_file = || find_depth_file(path).map(|file| format!("{}, beside it", file.display()));
     let by = networks.take().or_else(describe_file).unwrap_or_default();
-    Ok(Some(PhotoDepth { map, from: *from, measured, by }))
+    Ok(Some(PhotoDepth { map, from: *from, measured, by, notes: std::mem::take(notes) }))
 }
 
 /// Returns the files to read for a photo: the picture, and its depth file if there is one.
@@ -69,45 +74,54 @@ pub fn photo_files(path: &Path) -> impl Iterator<Item = PathBuf> {
     [original].into_iter().chain(depth)
 }
 
-/// A photo, its depth if there is any, and the origin of the depth.
-pub(super) type Photo = (ColorImage, Option<DepthMap>, DepthOrigin);
+/// A photo, and its depth, if there is any.
+pub(super) struct ReadPhoto {
+    pub color: ColorImage,
+    pub depth: Option<DepthMap>,
+    pub depth_from: DepthOrigin,
+    /// What was assumed about the depth, a line each.
+    pub notes: Vec<String>,
+}
 
-/// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the `.pfm` or `.png` file
-/// `NAME-depth` or `NAME.depth` next to it, unless the options request another origin.
+/// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the file `NAME-depth` or
+/// `NAME.depth` next to it, unless the options request another origin.
 ///
 /// # Errors
-/// The photo or its depth file is unreadable, or the depth has another size.
-pub(super) fn read_photo(path: &Path, options: &Options) -> Result<Photo, SourceError> {
+/// The photo or its depth file is unreadable, or the depth does not fit it.
+pub(super) fn read_photo(path: &Path, options: &Options) -> Result<ReadPhoto, SourceError> {
     let path = &original_path(path);
     let color = still::read_color(path)?;
     let is_wanted = matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
     let Some(file) = find_depth_file(path).filter(|_| is_wanted) else {
-        return Ok((color, None, DepthOrigin::Nothing));
+        return Ok(ReadPhoto { color, depth: None, depth_from: DepthOrigin::Nothing, notes: Vec::new() });
     };
-    let depth = &options.depth;
-    let (map, from) = match depth.file_unit() {
-        DepthUnit::Inverse { white_is_far } => {
-            (still::read_inverse_depth(&file, white_is_far, color.size())?, DepthOrigin::Relative)
+    let read = read_depth_file(&file, &options.depth, color.size())?;
+    let notes = read.notes.iter().map(|note| format!("{}: {note}", file.display())).collect();
+    Ok(ReadPhoto { color, depth_from: read.distances.into(), depth: Some(read.map), notes })
+}
+
+/// Reads the depth map `file` for a photo of `color` (columns, rows) pixels.
+///
+/// # Errors
+/// Same as for [`depth_file::read`].
+pub fn read_depth_file(file: &Path, options: &Depth, color: (u32, u32)) -> Result<DepthFile, SourceError> {
+    Ok(depth_file::read(file, &options.of_photo(), color)?)
+}
+
+impl From<Distances> for DepthOrigin {
+    fn from(distances: Distances) -> Self {
+        match distances {
+            Distances::Scaled => Self::Units,
+            Distances::Metres => Self::Metres,
+            Distances::Relative => Self::Relative,
         }
-        DepthUnit::Metres => {
-            let (map, from) = match still::read_map(&file, depth.depth_scale, Some(depth.depth_invalid))? {
-                Map::Depth(map) => (map, DepthOrigin::Units),
-                Map::Disparity(map, Some(rig)) => (map.to_depth_map(|px| rig.depth_m(px)), DepthOrigin::Metres),
-                Map::Disparity(map, None) => {
-                    let rig = StereoRig::default_for_width(map.width);
-                    (map.to_depth_map(|px| rig.depth_m(px)), DepthOrigin::Relative)
-                }
-            };
-            still::check_depth_size(&file, map.size(), color.size())?;
-            (map, from)
-        }
-    };
-    Ok((color, Some(map), from))
+    }
 }
 
 /// Returns the depth file next to a photo.
 fn find_depth_file(photo: &Path) -> Option<PathBuf> {
     let stem = photo.file_stem()?.to_str()?;
     let stem = stem.strip_suffix(COLOR).unwrap_or(stem);
-    DEPTH.iter().map(|ending| photo.with_file_name(format!("{stem}{ending}"))).find(|file| file.is_file())
+    let name = |(ending, extension): (&str, &str)| photo.with_file_name(format!("{stem}{ending}.{extension}"));
+    DEPTH.iter().flat_map(|ending| EXTENSIONS.map(|extension| name((ending, extension)))).find(|file| file.is_file())
 }

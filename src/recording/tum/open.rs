@@ -4,9 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
-use crate::recording::DepthUnit;
 use crate::recording::contents::{Contents, DepthFormat, ListedFrame, Locator, PictureSource, RecordingFolder};
-use crate::recording::decode::{self, DepthUnits, PictureKind};
+use crate::recording::decode::{self, PictureKind};
 use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
 use crate::recording::{Options, Unpaired, pair};
@@ -62,12 +61,7 @@ fn to_frame(color: Entry, depth: Option<PictureSource>) -> ListedFrame {
 
 /// `depth_options` must be given if the frames have depth.
 fn to_contents(frames: Vec<ListedFrame>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
-    let depth = depth_options.map(|options| match options.depth_unit {
-        DepthUnit::Metres => {
-            DepthFormat::Units(DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid })
-        }
-        DepthUnit::Inverse { white_is_far } => DepthFormat::Inverse { white_is_far },
-    });
+    let depth = depth_options.map(DepthFormat::of_pictures);
     Contents { frames, depth, stereo_geometry: None, disparity_count: None, unpaired }
 }
 

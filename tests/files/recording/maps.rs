@@ -5,7 +5,8 @@ use std::path::Path;
 
 use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
-use bokehcam::recording::still::{Map, read_depth, read_disparity, read_map, write_depth, write_disparity};
+use bokehcam::recording::depth_file::{self, Distances};
+use bokehcam::recording::still::{read_depth, read_disparity, write_depth, write_disparity};
 use tempfile::TempDir;
 
 use super::assert_says;
@@ -62,7 +63,7 @@ fn read_pfm(dir: &Path, content: &[u8]) -> Result<DepthMap, bokehcam::recording:
 #[test]
 fn a_pfm_is_read_from_its_bottom_row_in_either_byte_order() {
     let dir = TempDir::new().unwrap();
-    let values = [3.0, f32::INFINITY, 1.0, -2.0];
+    let values = [3.0, f32::NAN, 1.0, -2.0];
     let little: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
     let big: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
     for (scale, data) in [("-1.0", little), ("1", big)] {
@@ -78,7 +79,6 @@ fn a_wrong_pfm_is_told() {
     let dir = TempDir::new().unwrap();
     for (content, says) in [
         (&b"PF\n1 1\n-1\n0123456789ab"[..], "a colour PFM is not depth"),
-        (b"P5\n1 1\n255\n0", "not a grey PFM"),
         (b"Pf\n9999 9999\n-1\n", "claims 9999x9999"),
         (b"Pf\n0 4\n-1\n", "no pixel"),
         (b"Pf\n-1 4\n-1\n", "\"-1\" in its header is not a number"),
@@ -97,18 +97,22 @@ fn a_map_says_what_it_holds() {
     let depth = DepthMap { width: 2, height: 1, metres: vec![0.5, 4.0], ..DepthMap::default() };
     for name in ["z.png", "z.pfm"] {
         write_depth(&path(name), &depth, 1000.0, false).unwrap();
-        assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Depth(depth.clone()), "{name}");
+        assert_eq!(read_depth(&path(name), 1000.0, None).unwrap(), depth, "{name}");
     }
-    // An explicit scale overrides the file's.
-    let Map::Depth(other) = read_map(&path("z.png"), Some(500.0), None).unwrap() else { panic!("it is depth") };
-    assert_eq!(other.metres, [1.0, 8.0]);
+    // An explicit scale overrides that of whole numbers, and says so.
+    let options = depth_file::Options { scale: Some(500.0), ..depth_file::Options::default() };
+    let read = |name: &str| depth_file::read(&path(name), &options, (2, 1)).unwrap();
+    assert_eq!((&read("z.png").map.metres[..], read("z.pfm").map), (&[1.0, 8.0][..], depth));
+    assert!(read("z.png").notes[0].contains("states 1000 units per metre, but is read with 500"));
+    assert!(read("z.pfm").notes[0].contains("--depth-scale does not apply"));
 
     let disparity = DisparityMap { width: 2, height: 1, px: vec![10.0, 40.0] };
     let rig = StereoRig { focal_px: 200.0, baseline_m: 0.1, doffs_px: 0.0, metric: true };
     for (name, rig, read) in [("d.png", Some(rig), Some(rig)), ("e.png", None, None), ("d.pfm", Some(rig), None)] {
         write_disparity(&path(name), &disparity, rig, false).unwrap();
-        assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Disparity(disparity.clone(), read), "{name}");
         assert_eq!(read_disparity(&path(name)).unwrap(), disparity);
+        let file = depth_file::read(&path(name), &depth_file::Options::default(), (2, 1)).unwrap();
+        assert_eq!(file.distances == Distances::Metres, read.is_some(), "{name}");
         match read {
             Some(_) => assert_eq!(read_depth(&path(name), 5000.0, None).unwrap().metres, [2.0, 0.5]),
             None => assert_says(read_depth(&path(name), 5000.0, None), &[name, "disparity is not depth"]),

@@ -107,7 +107,7 @@ fn wrong_pictures_are_told_with_their_name() {
     save_grey(&path, SIZE, 9);
     assert_says(
         read_depth(&path, 5000.0, None),
-        &["picture.png: an 8-bit grey picture has too few steps", "dark is near", "If white is near"],
+        &["picture.png: an 8-bit grey picture", "inverse if white is near", "scale:N"],
     );
 }
 

@@ -17,6 +17,7 @@ use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
 use crate::files::warn_of_leftovers;
 use crate::focus;
+use crate::log;
 use crate::options;
 use crate::plausible;
 use crate::report;
@@ -152,6 +153,7 @@ impl Opened {
             window: false,
         };
         unused::warn_of_unused(&given.settings, &unused);
+        source.notes.iter().for_each(|note| log::note(note));
         if !plausible::warn_of_source(&source, &look, &options)
             && let Some(map) = source.first_depth.as_ref()
         {

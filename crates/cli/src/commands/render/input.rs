@@ -4,17 +4,15 @@ use std::path::Path;
 
 use super::RenderCommand;
 use crate::error::CliError;
-use crate::options;
+use crate::log;
 use crate::plausible;
 use bokehcam::depth::defocus;
 use bokehcam::depth::matting::mask;
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::Look;
-use bokehcam::optics::StereoRig;
-use bokehcam::recording::still::{self, MapFormat};
-use bokehcam::recording::{PhotoMetadata, snapshot};
-use bokehcam::source::options::DepthUnit;
+use bokehcam::recording::depth_file::DepthFile;
+use bokehcam::recording::{PhotoMetadata, snapshot, still};
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
 
@@ -23,13 +21,14 @@ pub(super) struct Input {
     pub color: ColorImage,
     pub metadata: PhotoMetadata,
     pub depth: Option<Depth>,
-    /// Origin of depth that was found in or beside the photo.
+    /// The origin of the depth.
+    pub depth_from: DepthOrigin,
+    /// Depth that was found in or beside the photo.
     pub found: Option<FoundDepth>,
 }
 
-/// Origin of depth that the photo brings without an option for it.
+/// Depth that the photo brings without an option for it.
 pub(super) struct FoundDepth {
-    pub from: DepthOrigin,
     pub measured: bool,
     pub by: String,
 }
@@ -38,48 +37,46 @@ pub(super) struct FoundDepth {
 /// `--like`; its depth is already refined and is not refined again.
 pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::source_paths(like));
-    let given =
-        command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
-    let mut found = None;
-    let (color, metadata, depth) = match (&command.image, sources) {
-        (None, Some((color, depth))) => {
-            let is_used = given.is_none() && depth.exists();
-            let kept = is_used.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
-            let (color, metadata) = still::read_photo(&color)?;
-            (color, metadata, given.or(kept))
-        }
-        (image, _) => {
-            // clap requires an image without `--like`.
-            let image = image.as_deref().unwrap_or(Path::new(""));
-            let searches_depth = given.is_none() && command.mask.is_none();
-            let is_automatic = matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
-            let searches_depth = searches_depth && is_automatic;
-            // A snapshot stands for the picture that it was made from.
-            let image = if searches_depth { photo::original_path(image) } else { image.to_owned() };
-            let (color, metadata) = still::read_photo(&image)?;
-            let is_wanted = searches_depth && look.effect.follows_depth();
-            let depth = if is_wanted {
-                photo::read_default_depth(&image, &color, &command.source_options(), look)?
-            } else {
-                None
-            };
-            let depth = depth.map(|PhotoDepth { map, from, measured, by }| {
-                if from == DepthOrigin::Networks {
-                    plausible::warn_of_subject(None, &map, None);
-                }
-                found = Some(FoundDepth { from, measured, by });
-                if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }
-            });
-            (color, metadata, given.or(depth))
-        }
+    let is_given = command.depth_map.is_some() || command.mask.is_some();
+    let is_automatic = matches!(command.blur.depth, DepthChoice::Auto | DepthChoice::Recorded);
+    let searches_depth = !is_given && is_automatic;
+    let (image, kept_depth) = match (&command.image, sources) {
+        (None, Some((color, depth))) => (color, Some(depth).filter(|depth| !is_given && depth.exists())),
+        // A snapshot stands for the picture that it was made from.
+        (Some(image), _) if searches_depth => (photo::original_path(image), None),
+        // clap requires an image without `--like`.
+        (image, _) => (image.clone().unwrap_or_default(), None),
     };
-    let mut depth = depth;
-    if let (Some(Depth::Measured(map)), Some(file)) = (&mut depth, &command.depth_map) {
-        still::check_depth_size(file, map.size(), color.size())?;
-        source::find_person(&command.source_options(), look, &color, map);
+    let (color, metadata) = still::read_photo(&image)?;
+    let mut input = Input { color, metadata, depth: None, depth_from: DepthOrigin::Nothing, found: None };
+    if let Some(made) = compute_depth(command, look, &input.color)? {
+        // Masks and networks have their own scale.
+        (input.depth, input.depth_from) = (Some(made), DepthOrigin::Metres);
+    } else if let Some(file) = &command.depth_map {
+        let (mut map, from) = read_depth(file, command, look, &input.color)?;
+        source::find_person(&command.source_options(), look, &input.color, &mut map);
+        (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
+    } else if let Some(file) = kept_depth {
+        let (map, from) = read_depth(&file, command, look, &input.color)?;
+        (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
+    } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
+        find_depth(&image, command, look, &mut input)?;
     }
-    let made = compute_depth(command, look, &color)?;
-    Ok(Input { color, metadata, depth: made.or(depth), found })
+    Ok(input)
+}
+
+/// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
+fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
+    let found = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
+    let Some(PhotoDepth { map, from, measured, by, notes }) = found else { return Ok(()) };
+    if from == DepthOrigin::Networks {
+        plausible::warn_of_subject(None, &map, None);
+    }
+    notes.iter().for_each(|note| log::note(note));
+    input.found = Some(FoundDepth { measured, by });
+    input.depth_from = from;
+    input.depth = Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) });
+    Ok(())
 }
 
 /// Computes depth from a mask or by networks; returns `None` if neither is requested.
@@ -117,57 +114,21 @@ fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Re
     }
 }
 
-/// Reads relative inverse depth as distances, in units of the nearest distance.
-fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
-    let (width, height, mut nearness) = match still::map_format(file) {
-        Ok(MapFormat::Pfm) => match still::read_map(file, None, None)? {
-            still::Map::Depth(map) => (map.width, map.height, map.metres),
-            still::Map::Disparity(map, _) => (map.width, map.height, map.px),
-        },
-        _ => still::read_grey(file)?,
-    };
-    let known = nearness.iter().copied().filter(|value| value.is_finite());
-    let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), value| (low.min(value), high.max(value)));
-    let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
-    for value in &mut nearness {
-        let near = (*value - low) * scale;
-        let near = if invert { 1.0 - near } else { near };
-        *value = if near.is_finite() { DepthMap::relative_to_metres(near) } else { 0.0 };
+/// Reads the depth map `file` for the picture `color`, and says what was assumed.
+///
+/// # Errors
+/// The file cannot be read, or the look needs metres and its distances are only relative.
+fn read_depth(
+    file: &Path,
+    command: &RenderCommand,
+    look: &Look,
+    color: &ColorImage,
+) -> Result<(DepthMap, DepthOrigin), CliError> {
+    let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, color.size())?;
+    let origin = DepthOrigin::from(distances);
+    if origin.is_relative() {
+        source::reject_metric_look(look, &format!("{} has relative depth, which gives", file.display()))?;
     }
-    Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
-}
-
-/// Reads depth in metres from a file of depth or disparity. Disparity without stereo geometry gives depth of unknown
-/// scale, which is an error if the look needs metres.
-fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
-    let name = file.display();
-    if command.depth.depth_unit == DepthUnit::Inverse {
-        source::reject_metric_look(look, source::INVERSE_DEPTH_GIVES)?;
-        return read_inverse_depth(file, command.depth.depth_invert);
-    }
-    let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
-    let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
-        still::Map::Depth(map) => return Ok(map),
-        still::Map::Disparity(map, rig) => (map, rig),
-    };
-    if depth_scale.is_some() {
-        tracing::warn!("{name}: contains disparity; --depth-scale does not apply to it");
-    }
-    let rig = match (rig, look.metric_setting()) {
-        (Some(rig), _) => rig,
-        (None, None) => {
-            tracing::warn!(
-                "{name}: contains disparity without a scale: the order of depth is known, distances are \
-                            not"
-            );
-            StereoRig::default_for_width(map.width)
-        }
-        (None, Some(needs)) => {
-            return Err(CliError::Usage(format!(
-                "{needs} needs distances, and {name} contains disparity without a scale: write it with `depth \
-                 --metres`, or use --focus auto or X,Y, and --blur"
-            )));
-        }
-    };
-    Ok(map.to_depth_map(|px| rig.depth_m(px)))
+    notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
+    Ok((map, origin))
 }

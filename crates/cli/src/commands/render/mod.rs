@@ -30,8 +30,7 @@ use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
 use bokehcam::recording::snapshot;
-use bokehcam::recording::still::{self, MapFormat, PhotoFormat};
-use bokehcam::source::options::DepthUnit;
+use bokehcam::recording::still::{self, PhotoFormat};
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
@@ -53,7 +52,7 @@ pub struct RenderCommand {
     /// The picture, PNG or JPEG [default: the original picture of the snapshot in --like]
     #[arg(required_unless_present = "like")]
     image: Option<PathBuf>,
-    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity written by `depth`
+    /// Its depth: a grey PNG, JPEG or TIFF, or numbers as TIFF, PFM, NPY, NPZ or EXR; or disparity written by `depth`
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
     /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
@@ -113,11 +112,11 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         )));
     }
     let look = look::build_look(&command.blur, &command.computing.quality)?;
-    let Input { color, metadata, depth, found } = read_input(command, &look)?;
+    let Input { color, metadata, depth, depth_from, found } = read_input(command, &look)?;
     let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
-    command.warn_of_settings(&look, &color, (depth.as_ref(), found.as_ref()), given);
+    command.warn_of_settings(&look, &color, (depth.as_ref(), depth_from, found.as_ref()), given);
     // As in a stream of this photo: only measured depth is refined.
     let look = match &found {
         Some(found) if look.refine == Refine::Auto => {
@@ -166,24 +165,16 @@ impl RenderCommand {
         &self,
         look: &Look,
         color: &ColorImage,
-        (depth, found): (Option<&Depth>, Option<&FoundDepth>),
+        (depth, depth_from, found): (Option<&Depth>, DepthOrigin, Option<&FoundDepth>),
         given: &GivenSettings,
     ) {
-        let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
-        let in_units = self.depth_map.as_ref().is_some_and(in_units);
-        let is_inverse = self.depth_map.is_some() && self.depth.depth_unit == DepthUnit::Inverse;
+        let in_units = depth_from == DepthOrigin::Units;
         let uses_depth = look.effect.follows_depth();
         unused::warn_of_unused(
             &given.settings,
             &unused::RunFacts {
                 source: FrameOrigin::Picture,
-                depth: match (depth, found) {
-                    (None, _) => DepthOrigin::Nothing,
-                    (_, Some(found)) => found.from,
-                    (Some(Depth::Measured(_)), _) if is_inverse => DepthOrigin::Relative,
-                    (Some(Depth::Measured(_)), _) if in_units => DepthOrigin::Units,
-                    (Some(_), _) => DepthOrigin::Metres,
-                },
+                depth: depth_from,
                 uses_depth,
                 effect: look.effect,
                 lens: matches!(look.strength, Strength::Lens(_)),
@@ -197,8 +188,13 @@ impl RenderCommand {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
             Some(Depth::Measured(map))
-                if self.depth_map.as_ref().is_some_and(|file| self.warn_of_map(&file.display(), map, color))
-                    || found.is_some_and(|found| found.measured && self.warn_of_map(&found.by, map, color)) => {}
+                if self
+                    .depth_map
+                    .as_ref()
+                    .is_some_and(|file| self.warn_of_map(&file.display(), map, color, depth_from))
+                    || found
+                        .is_some_and(|found| found.measured && self.warn_of_map(&found.by, map, color, depth_from)) => {
+            }
             Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
@@ -212,12 +208,10 @@ impl RenderCommand {
 
 impl RenderCommand {
     /// Warns of an implausible depth map; returns whether it did.
-    fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage) -> bool {
-        let file = self.depth_map.as_deref();
-        let is_scaled = file.is_some_and(|file| still::map_format(file).is_ok_and(|format| format == MapFormat::Pfm));
-        match self.depth.depth_unit {
-            DepthUnit::Inverse => plausible::warn_of_inverse(name, map, color),
-            DepthUnit::Metres => plausible::warn_of_map(name, map, is_scaled || self.depth.depth_scale.is_some()),
+    fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage, from: DepthOrigin) -> bool {
+        match from {
+            DepthOrigin::Relative => plausible::warn_of_inverse(name, map, color),
+            from => plausible::warn_of_map(name, map, from != DepthOrigin::Units || self.depth.depth_scale.is_some()),
         }
     }
 }

@@ -11,15 +11,46 @@ fn render(home: &Home, more: &[&str]) -> Ran {
 }
 
 #[test]
-fn depth_of_another_aspect_or_orientation_is_refused() {
+fn depth_of_another_aspect_is_asked_about_unless_it_is_that_of_a_network_or_a_sensor() {
     let home = Home::new().with_photo();
-    for (name, (width, height)) in [("tall.png", (48, 64)), ("square.pfm", (48, 48))] {
+    for (name, (width, height)) in [("tall.png", (48, 64)), ("wide.pfm", (64, 36))] {
         home.add_depth(name, (width, height));
         let said = format!("{name}: the depth map is {width}x{height}, which does not cover a colour picture of 64x48");
-        render(&home, &["--depth-map", name]).refused(1, &[&said]);
+        render(&home, &["--depth-map", name]).refused(1, &[&said, "--depth-fit stretch", "--depth-fit crop"]);
+        for fit in ["stretch", "crop"] {
+            render(&home, &["--depth-map", name, "--depth-fit", fit]).done();
+        }
     }
-    home.add_depth("half.png", (32, 24));
-    assert_eq!(render(&home, &["--depth-map", "half.png"]).warning(), "");
+    for (name, size, note) in [
+        ("half.png", (32, 24), ""),
+        ("square.png", (48, 48), "48x48 pixels, stretched to the picture's 64x48"),
+        ("sensor.pfm", (50, 37), "50x37 pixels, stretched"),
+        ("large.png", (256, 192), ""),
+    ] {
+        home.add_depth(name, size);
+        let ran = render(&home, &["--depth-map", name]);
+        assert_eq!(ran.warning(), "", "{name}");
+        assert_eq!(ran.stderr.contains("stretched"), !note.is_empty(), "{name}: {}", ran.stderr);
+        assert!(ran.stderr.contains(note), "{name}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_stream_and_a_picture_of_a_photo_with_a_relative_map_look_alike() {
+    let home = Home::new().with_photo();
+    fs::copy(home.path("photo.png"), home.path("ph.png")).unwrap();
+    // As telephones write it: 8 bits, of which few are used.
+    image::GrayImage::from_fn(64, 48, |x, _| [100 + (60 - x.min(60)) as u8].into())
+        .save(home.path("ph-depth.png"))
+        .unwrap();
+    let relative = ["--depth-unit", "inverse", "--backend", "cpu", "--force"];
+    let picture = |path: &str| still::read_color(&home.path(path)).unwrap();
+    let ran = home.run(&[&["render", "ph.png", "--out", "r.png"], &relative[..]].concat());
+    assert!(ran.done().contains("taken as near; --depth-invert"), "{}", ran.stderr);
+    let ran = home.run(&[&["stream", "ph.png", "--to", "s/"], &relative[..]].concat());
+    assert!(ran.done().contains("taken as near; --depth-invert"), "{}", ran.stderr);
+    home.run(&[&["render", "ph.png", "--depth-map", "ph-depth.png", "--out", "m.png"], &relative[..]].concat()).done();
+    assert!(picture("r.png") == picture("s/000000.png") && picture("r.png") == picture("m.png"));
 }
 
 /// Inserts EXIF orientation 6 (rotate 90° clockwise) after the header of a PNG.

@@ -1,0 +1,173 @@
+//! The meaning of a map's numbers: what the caller says, else the file, else its content, as far as it is unmistakable.
+
+use super::values::{Samples, Values};
+use super::{DepthFile, DepthUnit, Distances, Options};
+use crate::frame::{DepthMap, DisparityMap};
+use crate::optics::StereoRig;
+use crate::recording::fault::PictureFault;
+use crate::recording::tum;
+use crate::recording::unit::MapUnit;
+
+/// What the numbers are.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Meaning {
+    quantity: Quantity,
+    distances: Distances,
+    notes: Vec<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Quantity {
+    Depth { per_m: f32 },
+    Inverse,
+    Disparity { per_px: f32, rig: Option<StereoRig> },
+}
+
+/// No scene that a camera sees is deeper, but for its sky.
+const MAX_PLAUSIBLE_M: f32 = 1000.0;
+/// Share of the pixels beyond that which counts as noise.
+const MAX_IMPLAUSIBLE: f32 = 0.005;
+/// Share of 256 equal ranges of 16 bits in which a map that was stretched to all of them has values.
+const STRETCHED: usize = 256 * 3 / 10;
+/// Share of unknown depth that is reported.
+const MAX_UNKNOWN: f32 = 0.05;
+
+impl Meaning {
+    /// Decides what the numbers mean.
+    ///
+    /// # Errors
+    /// It is not stated, and they may be distances or nearness.
+    pub fn decide(values: &Values, options: &Options) -> Result<Self, PictureFault> {
+        let mut notes = Vec::new();
+        let unit = options.unit.or(options.invert.then_some(DepthUnit::Inverse));
+        let without_scale = |notes: &mut Vec<String>, what: &str| {
+            if options.scale.is_some() {
+                notes.push(format!("{what}; --depth-scale does not apply to it"));
+            }
+        };
+        let (quantity, distances) = match (unit, values.stated) {
+            (Some(DepthUnit::Inverse), _) => {
+                if !options.invert {
+                    notes.push("the largest values are taken as near; --depth-invert takes them as far".to_owned());
+                }
+                (Quantity::Inverse, Distances::Relative)
+            }
+            (Some(DepthUnit::PerMetre(per_m)), _) => (Quantity::Depth { per_m }, Distances::Metres),
+            (Some(DepthUnit::Disparity), stated) | (None, stated @ Some(MapUnit::Disparity { .. })) => {
+                without_scale(&mut notes, "contains disparity");
+                let rig = stated.and_then(|stated| stated.rig());
+                if rig.is_none() {
+                    notes.push(
+                        "contains disparity without a scale: the order of depth is known, distances are not".to_owned(),
+                    );
+                }
+                let distances = if rig.is_some() { Distances::Metres } else { Distances::Relative };
+                (Quantity::Disparity { per_px: values.disparities_per_px(), rig }, distances)
+            }
+            (Some(DepthUnit::Metres) | None, stated) => {
+                let per_m = match (values.samples, stated, options.scale) {
+                    (Samples::Float, _, _) => {
+                        without_scale(&mut notes, "contains floats, in metres");
+                        1.0
+                    }
+                    (Samples::Eight, _, _) => return Err(PictureFault::CoarseDepth),
+                    (_, Some(MapUnit::Depth { per_m }), Some(given)) if given != per_m => {
+                        notes.push(format!("states {per_m} units per metre, but is read with {given}, as requested"));
+                        given
+                    }
+                    (_, _, Some(given)) => given,
+                    (_, Some(MapUnit::Depth { per_m }), None) => per_m,
+                    (Samples::Sixteen, _, None) => tum::DEPTH_SCALE,
+                    (Samples::Whole, _, None) => {
+                        return Err(PictureFault::UnclearDepth("whole numbers of an unknown unit"));
+                    }
+                };
+                if unit.is_none() && stated.is_none() && options.scale.is_none() {
+                    check_unclear(values).map_or(Ok(()), |what| Err(PictureFault::UnclearDepth(what)))?;
+                }
+                let is_sure = values.samples == Samples::Float;
+                (Quantity::Depth { per_m }, if is_sure { Distances::Metres } else { Distances::Scaled })
+            }
+        };
+        Ok(Self { quantity, distances, notes })
+    }
+
+    /// Converts the numbers to depth.
+    pub fn into_depth(self, values: Values, options: &Options) -> DepthFile {
+        let Self { quantity, distances, mut notes } = self;
+        let (width, height) = values.size;
+        // In inverse depth 0 is the farthest, unless it is said to be unknown.
+        let invalid = options.invalid.filter(|&invalid| quantity != Quantity::Inverse || invalid != 0.0);
+        let is_valid = |number: f32| Some(number) != invalid;
+        let mut numbers = values.numbers;
+        let map = match quantity {
+            Quantity::Depth { per_m } => {
+                for number in &mut numbers {
+                    // Infinity is how renderers write what they never hit: the farthest there is.
+                    let far = if *number > 0.0 { DepthMap::MAX_M } else { 0.0 };
+                    let metres = *number / per_m;
+                    let metres = if metres <= DepthMap::MAX_M { metres } else { far };
+                    *number = if is_valid(*number) && DepthMap::is_known(metres) { metres } else { 0.0 };
+                }
+                DepthMap { width, height, metres: numbers, ..DepthMap::default() }
+            }
+            Quantity::Inverse => {
+                let is_known = |number: f32| number.is_finite() && is_valid(number);
+                let known = || numbers.iter().copied().filter(|&number| is_known(number));
+                let (low, high) = known().fold((f32::MAX, f32::MIN), |(low, high), n| (low.min(n), high.max(n)));
+                let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
+                for number in &mut numbers {
+                    let near = (*number - low) * scale;
+                    let near = if options.invert { 1.0 - near } else { near };
+                    *number = if is_known(*number) { DepthMap::relative_to_metres(near) } else { 0.0 };
+                }
+                DepthMap { width, height, metres: numbers, ..DepthMap::default() }
+            }
+            Quantity::Disparity { per_px, rig } => {
+                let rig = rig.unwrap_or_else(|| StereoRig::default_for_width(width));
+                numbers.iter_mut().for_each(|number| *number = if is_valid(*number) { *number / per_px } else { 0.0 });
+                DisparityMap { width, height, px: numbers }.to_depth_map(|px| rig.depth_m(px))
+            }
+        };
+        let unknown = map.metres.iter().filter(|&&metres| metres == 0.0).count() as f32 / map.metres.len() as f32;
+        if unknown > MAX_UNKNOWN {
+            notes.push(format!("depth is unknown in {:.0} % of it, and is filled in", 100.0 * unknown));
+        }
+        DepthFile { map, distances, notes }
+    }
+}
+
+/// Returns what is wrong with numbers that would be taken as distances, as nothing else is stated.
+fn check_unclear(values: &Values) -> Option<&'static str> {
+    let known = || values.numbers.iter().copied().filter(|&number| number.is_finite());
+    let (low, high) = known().fold((f32::MAX, f32::MIN), |(low, high), n| (low.min(n), high.max(n)));
+    match values.samples {
+        Samples::Sixteen => {
+            let mut ranges = [false; 256];
+            known().for_each(|number| ranges[usize::from(number as u16 >> 8)] = true);
+            let count = ranges.iter().filter(|range| **range).count();
+            // What a sensor does not see it writes as 0 or 65535, so that neither alone means anything.
+            let is_stretched = low == 0.0 && high == 65535.0 && count >= STRETCHED && ranges[240..255].contains(&true);
+            is_stretched.then_some("numbers stretched from 0 to 65535")
+        }
+        Samples::Float if (low, high) == (0.0, 1.0) => Some("numbers stretched from 0 to 1"),
+        Samples::Float => {
+            // A sky has one distance, however large.
+            let is_far = |number: f32| number > MAX_PLAUSIBLE_M && number < high;
+            let far = known().filter(|&number| is_far(number)).count();
+            (far as f32 > MAX_IMPLAUSIBLE * values.numbers.len() as f32)
+                .then_some("distances of more than a kilometre, if they are metres")
+        }
+        Samples::Eight | Samples::Whole => None,
+    }
+}
+
+/// Rejects maps that tell nothing. If the file states its unit, it may be flat, as walls are.
+pub(super) fn check_usable(map: &DepthMap, is_stated: bool) -> Result<(), PictureFault> {
+    let mut known = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
+    let first = known.next().ok_or(PictureFault::NoDepth("no depth is known anywhere in it"))?;
+    if !is_stated && known.all(|metres| metres == first) {
+        return Err(PictureFault::NoDepth("it has one value all over, so nothing is nearer than the rest"));
+    }
+    Ok(())
+}

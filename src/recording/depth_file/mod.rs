@@ -1,0 +1,100 @@
+//! Depth maps of single pictures, as files of any tool: reads the numbers ([`values`]), decides what they mean
+//! ([`meaning`]), and fits the map to its picture ([`fit`]).
+
+mod exr;
+mod fit;
+mod meaning;
+mod npy;
+mod tiff;
+mod unit;
+mod values;
+
+use std::path::Path;
+
+pub use fit::{Fit, covers, describe_stretch};
+pub use unit::DepthUnit;
+
+use super::RecordingError;
+use super::fault::PictureFault;
+use crate::frame::{DepthMap, DisparityMap};
+use meaning::Meaning;
+
+/// File formats of depth maps, for messages.
+pub(super) const FORMATS: &str = "PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR";
+
+/// How to read a depth map.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The meaning of its numbers; `None` leaves it to the file.
+    pub unit: Option<DepthUnit>,
+    /// Whether the largest number of relative inverse depth is the farthest instead of the nearest.
+    pub invert: bool,
+    /// Units per metre of whole numbers, > 0; `None` is that of the file.
+    pub scale: Option<f32>,
+    /// A number that means unknown, besides 0, negative ones and NaN.
+    pub invalid: Option<f32>,
+    /// How a map of another aspect ratio is fitted to its picture.
+    pub fit: Option<Fit>,
+}
+
+/// What the distances of a map are worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Distances {
+    /// Metres, if the scale of its whole numbers is right.
+    Scaled,
+    /// Metres, as the file states.
+    Metres,
+    /// Only their order is known.
+    Relative,
+}
+
+/// A depth map that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthFile {
+    /// Depth in metres, 0 = unknown.
+    pub map: DepthMap,
+    /// What its distances are worth.
+    pub distances: Distances,
+    /// What was assumed or changed, a line each.
+    pub notes: Vec<String>,
+}
+
+/// Reads the depth map of a picture of `color` (columns, rows) pixels, upright by its orientation tag and fitted to
+/// that size.
+///
+/// The format follows from the content: grey PNG, JPEG or TIFF (or RGB with equal channels), float TIFF, PFM, NPY, NPZ
+/// or EXR. The unit is that of `options`, else the one that the file states, as those of [`write_depth`] and
+/// [`write_disparity`] do; else a 16-bit PNG has 5000 units per metre, and floats are metres.
+///
+/// [`write_depth`]: super::still::write_depth
+/// [`write_disparity`]: super::still::write_disparity
+///
+/// # Errors
+/// The file is missing, of another kind, too large, truncated or damaged; a picture in colours; its unit is unclear, or
+/// nothing in it is usable; it has another aspect ratio, and `options` do not say how it fits.
+pub fn read(path: &Path, options: &Options, color: (u32, u32)) -> Result<DepthFile, RecordingError> {
+    let read = || -> Result<DepthFile, PictureFault> {
+        let values = values::read(path)?;
+        let is_stated = values.stated.is_some();
+        let mut file = Meaning::decide(&values, options)?.into_depth(values, options);
+        meaning::check_usable(&file.map, is_stated)?;
+        fit::fit_to(&mut file, options.fit, color)?;
+        Ok(file)
+    };
+    read().map_err(RecordingError::picture(path))
+}
+
+/// Does the same as [`read`] in the size of the file, which may be of one depth, or of none.
+pub(super) fn read_unfitted(path: &Path, options: &Options) -> Result<DepthFile, PictureFault> {
+    let values = values::read(path)?;
+    Ok(Meaning::decide(&values, options)?.into_depth(values, options))
+}
+
+/// Reads a map of disparities in pixels, 0 = unknown: whole numbers of 16 bits are 1/256 px.
+pub(super) fn read_disparity(path: &Path) -> Result<DisparityMap, PictureFault> {
+    let values = values::read(path)?;
+    let per_px = values.disparities_per_px();
+    let px = |value: f32| if DepthMap::is_known(value) { value / per_px } else { 0.0 };
+    let (width, height) = values.size;
+    Ok(DisparityMap { width, height, px: values.numbers.into_iter().map(px).collect() })
+}

@@ -1,0 +1,170 @@
+//! Arrays of NumPy: `.npy` ("NPY format", numpy.org/doc/stable/reference/generated/numpy.lib.format.html), and the first
+//! map in a `.npz`, which is a zip of them.
+
+use std::fs::File;
+use std::io::Read;
+
+use zip::ZipArchive;
+use zip::result::ZipError;
+
+use super::values::{Samples, Values};
+use crate::recording::coded::check_size;
+use crate::recording::fault::PictureFault;
+
+/// Longest header that is read; those of arrays without named fields have 128 bytes.
+const MAX_HEADER_BYTES: usize = 1 << 16;
+/// Largest number of arrays that are searched for a map.
+const MAX_ARRAYS: usize = 64;
+/// Usual names of the map among several arrays, in order of preference.
+const NAMES: [&str; 6] = ["depth", "depth_map", "depths", "prediction", "pred", "disparity"];
+
+/// Parses an array of two dimensions; further ones of length 1 are ignored.
+pub(super) fn parse(file: &[u8]) -> Result<Values, PictureFault> {
+    let header_at = match file.get(6) {
+        Some(1) => 10,
+        Some(2 | 3) => 12,
+        Some(version) => return Err(PictureFault::Damaged(format!("version {version} of NPY is unknown"))),
+        None => return Err(PictureFault::Truncated),
+    };
+    let length = file.get(8..header_at).ok_or(PictureFault::Truncated)?;
+    let length = length.iter().rev().fold(0, |length, byte| length << 8 | usize::from(*byte));
+    if length > MAX_HEADER_BYTES {
+        return Err(PictureFault::Damaged(format!("its header claims {length} bytes")));
+    }
+    let header = file.get(header_at..header_at + length).ok_or(PictureFault::Truncated)?;
+    let header = std::str::from_utf8(header).map_err(|_| PictureFault::Damaged("its header is not text".into()))?;
+    let array = Header::parse(header)?;
+    array.read(&file[header_at + length..])
+}
+
+/// What the header of an array says.
+struct Header {
+    /// Rows and columns.
+    shape: [usize; 2],
+    is_column_major: bool,
+    is_big_endian: bool,
+    /// Type: `f`, `i`, `u` or `b`.
+    kind: u8,
+    /// Bytes per number.
+    bytes: usize,
+}
+
+impl Header {
+    fn parse(text: &str) -> Result<Self, PictureFault> {
+        let short = || text.trim().chars().take(120).collect::<String>();
+        let broken = || PictureFault::Damaged(format!("{:?} is not the header of an array", short()));
+        let value = |key: &str| {
+            let after = text.split_once(&format!("'{key}'"))?.1.trim_start();
+            Some(after.strip_prefix(':')?.trim_start())
+        };
+        let descr = value("descr").ok_or_else(broken)?;
+        let descr = descr.strip_prefix('\'').and_then(|text| text.split('\'').next()).unwrap_or_default();
+        let is_column_major = value("fortran_order").ok_or_else(broken)?.starts_with("True");
+        let shape = value("shape").and_then(|text| text.strip_prefix('(')?.split(')').next()).ok_or_else(broken)?;
+        let sides = shape.split(',').map(str::trim).filter(|side| !side.is_empty());
+        let sides: Vec<usize> = sides.map(str::parse).collect::<Result<_, _>>().map_err(|_| broken())?;
+        let of_map: Vec<usize> = sides.iter().copied().filter(|&side| side != 1).collect();
+        let shape = match (sides.len(), of_map.as_slice()) {
+            (2, _) => [sides[0], sides[1]],
+            (3.., &[rows, columns]) => [rows, columns],
+            _ => return Err(PictureFault::NotAMap(format!("an array of shape ({})", shape.trim()))),
+        };
+        let (kind, bytes) = match descr.trim_start_matches(['<', '>', '|', '=']) {
+            "f2" => (b'f', 2),
+            "f4" => (b'f', 4),
+            "f8" => (b'f', 8),
+            "u1" | "b1" => (b'u', 1),
+            "u2" => (b'u', 2),
+            "u4" => (b'u', 4),
+            "i2" => (b'i', 2),
+            "i4" => (b'i', 4),
+            "i8" => (b'i', 8),
+            _ => return Err(PictureFault::NotAMap(format!("an array of type {descr:?}"))),
+        };
+        Ok(Self { shape, is_column_major, is_big_endian: descr.starts_with('>'), kind, bytes })
+    }
+
+    fn read(&self, data: &[u8]) -> Result<Values, PictureFault> {
+        let [rows, columns] = self.shape;
+        let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
+        check_size(side(columns), side(rows))?;
+        let data = data.get(..rows * columns * self.bytes).ok_or(PictureFault::Truncated)?;
+        let stored = data.chunks_exact(self.bytes).map(|bytes| self.number(bytes));
+        let numbers: Vec<f32> = match self.is_column_major {
+            false => stored.collect(),
+            true => {
+                let stored: Vec<f32> = stored.collect();
+                (0..rows * columns).map(|k| stored[k % columns * rows + k / columns]).collect()
+            }
+        };
+        let samples = match (self.kind, self.bytes) {
+            (b'f', _) => Samples::Float,
+            (_, 1) => Samples::Eight,
+            _ => Samples::Whole,
+        };
+        Ok(Values { size: (side(columns), side(rows)), numbers, samples, stated: None })
+    }
+
+    fn number(&self, bytes: &[u8]) -> f32 {
+        let mut ordered = [0; 8];
+        ordered[..bytes.len()].copy_from_slice(bytes);
+        if self.is_big_endian {
+            ordered[..bytes.len()].reverse();
+        }
+        let whole = u64::from_le_bytes(ordered);
+        match (self.kind, self.bytes) {
+            (b'f', 2) => half_to_float(whole as u16),
+            (b'f', 4) => f32::from_bits(whole as u32),
+            (b'f', _) => f64::from_bits(whole) as f32,
+            (b'i', 2) => f32::from(whole as i16),
+            (b'i', 4) => whole as i32 as f32,
+            (b'i', _) => whole as i64 as f32,
+            _ => whole as f32,
+        }
+    }
+}
+
+/// Converts a number of 16 bits (IEEE 754 binary16).
+pub(super) fn half_to_float(bits: u16) -> f32 {
+    let (sign, exponent, fraction) = (bits >> 15, bits >> 10 & 31, f32::from(bits & 1023));
+    let size = match exponent {
+        0 => fraction * 2.0_f32.powi(-24),
+        31 if fraction == 0.0 => f32::INFINITY,
+        31 => f32::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2.0_f32.powi(i32::from(exponent) - 15),
+    };
+    if sign == 1 { -size } else { size }
+}
+
+/// Reads the map in an archive of arrays, each of at most `max_bytes`.
+pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, PictureFault> {
+    let mut archive = ZipArchive::new(file).map_err(zip_fault)?;
+    let mut arrays = Vec::new();
+    for index in 0..archive.len().min(MAX_ARRAYS) {
+        let member = archive.by_index(index).map_err(zip_fault)?;
+        let name = String::from_utf8_lossy(member.name_raw()).to_lowercase();
+        if let Some(stem) = name.strip_suffix(".npy") {
+            arrays.push((NAMES.iter().position(|known| *known == stem).unwrap_or(NAMES.len()), index));
+        }
+    }
+    arrays.sort_unstable();
+    let mut first_fault = None;
+    for (_, index) in arrays {
+        let member = archive.by_index(index).map_err(zip_fault)?;
+        if member.size() > max_bytes {
+            return Err(PictureFault::FileSize { bytes: member.size(), max_bytes });
+        }
+        let mut array = Vec::new();
+        member.take(max_bytes).read_to_end(&mut array).map_err(|error| zip_fault(ZipError::Io(error)))?;
+        match parse(&array) {
+            // Cameras and poses are stored beside the map.
+            Err(fault @ PictureFault::NotAMap(_)) => first_fault = first_fault.or(Some(fault)),
+            read => return read,
+        }
+    }
+    Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())))
+}
+
+fn zip_fault(error: ZipError) -> PictureFault {
+    PictureFault::Damaged(error.to_string().replace('\n', " "))
+}

@@ -1,0 +1,69 @@
+//! TIFF with one channel (or three equal ones) of 8 or 16 bits, or floats.
+
+use std::fs::File;
+use std::io::BufReader;
+
+use tiff::TiffError;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+
+use super::values::{ColorCount, Samples, Values};
+use crate::recording::coded::check_size;
+use crate::recording::fault::PictureFault;
+
+/// Memory for the decoder besides the pixels: one strip or tile, and the lists of them.
+const MAX_BUFFER_BYTES: usize = 64 << 20;
+
+/// Reads the first picture of a file.
+pub(super) fn read(file: File) -> Result<Values, PictureFault> {
+    let mut decoder = Decoder::new(BufReader::new(file)).map_err(fault)?;
+    let (width, height) = decoder.dimensions().map_err(fault)?;
+    check_size(width, height)?;
+    let pixels = width as usize * height as usize;
+    let mut limits = Limits::default();
+    // At most four channels of four bytes.
+    limits.decoding_buffer_size = 16 * pixels;
+    limits.intermediate_buffer_size = MAX_BUFFER_BYTES;
+    limits.ifd_value_size = MAX_BUFFER_BYTES;
+    let mut decoder = decoder.with_limits(limits);
+    let numbers = |samples, white, stored: Vec<f32>| {
+        let channels = (stored.len() / pixels).max(1);
+        let mut colors = ColorCount::new(white);
+        let numbers: Vec<f32> = match channels {
+            1 => stored,
+            _ => stored
+                .chunks_exact(channels)
+                .map(|pixel| {
+                    if let [r, g, b, ..] = *pixel {
+                        colors.add([r, g, b]);
+                    }
+                    pixel[0]
+                })
+                .collect(),
+        };
+        if numbers.len() != pixels {
+            return Err(PictureFault::Truncated);
+        }
+        colors.check(pixels)?;
+        Ok(Values { size: (width, height), numbers, samples, stated: None })
+    };
+    let floats = |stored| numbers(Samples::Float, 1.0, stored);
+    let whole = |stored| numbers(Samples::Whole, 65535.0, stored);
+    match decoder.read_image().map_err(fault)? {
+        DecodingResult::U8(codes) => numbers(Samples::Eight, 255.0, codes.into_iter().map(f32::from).collect()),
+        DecodingResult::U16(codes) => whole(codes.into_iter().map(f32::from).collect()),
+        DecodingResult::U32(codes) => whole(codes.into_iter().map(|code| code as f32).collect()),
+        DecodingResult::I16(codes) => whole(codes.into_iter().map(f32::from).collect()),
+        DecodingResult::I32(codes) => whole(codes.into_iter().map(|code| code as f32).collect()),
+        DecodingResult::F16(stored) => floats(stored.into_iter().map(f32::from).collect()),
+        DecodingResult::F32(stored) => floats(stored),
+        DecodingResult::F64(stored) => floats(stored.into_iter().map(|number| number as f32).collect()),
+        _ => Err(PictureFault::NotAMap("a TIFF of this number format".to_owned())),
+    }
+}
+
+fn fault(error: TiffError) -> PictureFault {
+    match error {
+        TiffError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => PictureFault::Damaged(other.to_string().replace('\n', " ")),
+    }
+}
