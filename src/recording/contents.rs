@@ -60,8 +60,10 @@ pub(super) enum DepthFormat {
 pub(super) struct RecordingFolder {
     /// The path as given, for messages.
     pub(super) dir: PathBuf,
-    /// The path with all links resolved: no picture may lie outside it.
+    /// The path with all links resolved: no picture may lie outside it, unless links are followed.
     pub(super) root: PathBuf,
+    /// Whether links may lead outside.
+    pub(super) follow_links: bool,
 }
 
 /// A line of a list, for messages.
@@ -89,7 +91,10 @@ impl RecordingFolder {
     }
 
     fn within(&self, path: PathBuf, source: &PictureSource) -> Result<PathBuf, RecordingError> {
-        if path.starts_with(&self.root) { Ok(path) } else { Err(source.error(&self.dir, PictureFault::Outside)) }
+        match self.follow_links || path.starts_with(&self.root) {
+            true => Ok(path),
+            false => Err(source.error(&self.dir, PictureFault::Outside)),
+        }
     }
 }
 

@@ -64,27 +64,36 @@ pub enum DepthUnit {
 /// Options for reading a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Units of the depth pictures per metre, > 0.
-    pub depth_scale: f32,
+    /// Units of the depth pictures per metre, > 0; `None` for those that the layout states or usually has.
+    pub depth_scale: Option<f32>,
     /// The meaning of the values in depth pictures.
     pub depth_unit: DepthUnit,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
     /// Largest time difference between a colour picture and its depth map or right picture, in nanoseconds.
     pub pair_tolerance_ns: u64,
+    /// Frame period of pictures without times, in nanoseconds, > 0; `None` for that of the layout.
+    pub period_ns: Option<u64>,
+    /// Width and height of the scenes to read, where a recording has scenes of several sizes; `None` for the first.
+    pub size: Option<(u32, u32)>,
+    /// Whether links may lead outside the recording.
+    pub follow_links: bool,
     /// Whether faulty lines of lists and missing right pictures become frames that fail to read. Otherwise the first
     /// one fails [`Recording::open`].
     pub keep_going: bool,
 }
 
 impl Default for Options {
-    /// Values of the TUM benchmark: 5000 units per metre, pairs within 20 ms. Faulty lists are rejected.
+    /// Pairs within 20 ms, as in the TUM benchmark. Faulty lists and links to the outside are rejected.
     fn default() -> Self {
         Self {
-            depth_scale: tum::DEPTH_SCALE,
+            depth_scale: None,
             depth_unit: DepthUnit::Metres,
             depth_invalid: None,
             pair_tolerance_ns: 20_000_000,
+            period_ns: None,
+            size: None,
+            follow_links: false,
             keep_going: false,
         }
     }
@@ -147,9 +156,9 @@ impl Recording {
     /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture is readable (reports
     /// the first). Without `keep_going` also any faulty line of a list, and a missing right picture.
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
-        check_depth_scale(options.depth_scale)?;
+        options.depth_scale.map_or(Ok(()), check_depth_scale)?;
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
-        let folder = RecordingFolder { dir: dir.to_owned(), root };
+        let folder = RecordingFolder { dir: dir.to_owned(), root, follow_links: options.follow_links };
         let not_a_recording =
             || RecordingError::NotARecording { dir: dir.to_owned(), expected_files: describe_expected_files() };
         let layout = LAYOUTS.iter().find(|layout| (layout.matches_folder)(dir)).ok_or_else(not_a_recording)?;

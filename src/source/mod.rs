@@ -231,19 +231,24 @@ impl Source {
     }
 }
 
-impl OpenRequest<'_> {
-    /// Returns the options for reading a recording with depth pictures.
-    fn recording_options(&self) -> Reading {
-        let Options { depth, keep_going, .. } = self.options;
+impl Options {
+    /// Returns the options for reading a recording.
+    pub fn recording_options(&self) -> Reading {
+        let Self { frames, depth, keep_going, .. } = self;
         Reading {
-            depth_scale: depth.file_scale(),
+            depth_scale: depth.depth_scale,
             depth_unit: depth.file_unit(),
             depth_invalid: Some(depth.depth_invalid),
+            period_ns: frames.fps.map(|fps| (1e9 / fps) as u64),
+            size: frames.size.map(|size| (size.width, size.height)),
+            follow_links: frames.follow_links,
             keep_going: *keep_going,
             ..Reading::default()
         }
     }
+}
 
+impl OpenRequest<'_> {
     /// Returns whether the effect uses depth.
     pub fn uses_depth(&self) -> bool {
         self.look.is_none_or(|look| look.effect.follows_depth())

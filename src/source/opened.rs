@@ -67,7 +67,7 @@ impl Opened {
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &request.recording_options())?);
+                let recording = Arc::new(Recording::open(folder, &request.options.recording_options())?);
                 let name = folder.display().to_string();
                 let part = PlayRange {
                     start_s: frames.start.unwrap_or(0.0),

@@ -64,7 +64,8 @@ fn to_frame(color: Entry, depth: Option<PictureSource>) -> ListedFrame {
 fn to_contents(frames: Vec<ListedFrame>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
     let depth = depth_options.map(|options| match options.depth_unit {
         DepthUnit::Metres => {
-            DepthFormat::Units(DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid })
+            let scale = options.depth_scale.unwrap_or(super::DEPTH_SCALE);
+            DepthFormat::Units(DepthUnits { scale, invalid: options.depth_invalid })
         }
         DepthUnit::Inverse { white_is_far } => DepthFormat::Inverse { white_is_far },
     });
