@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::decode::DepthUnits;
@@ -67,9 +68,10 @@ pub(super) struct RecordingFolder {
 }
 
 /// A line of a list, for messages.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ListPosition {
-    pub(super) list: &'static str,
+    /// Its file, relative to the recording's folder; shared by all lines.
+    pub(super) list: Arc<str>,
     pub(super) line: u32,
 }
 
@@ -144,7 +146,7 @@ impl PictureSource {
     pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
         self.file.as_deref().map_err(|fault| {
             let (list, line) =
-                self.position.map_or((dir.to_owned(), 0), |position| (dir.join(position.list), position.line));
+                self.position.as_ref().map_or((dir.to_owned(), 0), |at| (dir.join(&*at.list), at.line));
             RecordingError::Line { list, line, fault: fault.clone() }
         })
     }
@@ -152,8 +154,10 @@ impl PictureSource {
     /// Returns the error for a picture with `fault`, with the line that names it.
     pub(super) fn error(&self, dir: &Path, fault: PictureFault) -> RecordingError {
         let file = self.file.clone().unwrap_or_default();
-        match self.position {
-            Some(ListPosition { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
+        match &self.position {
+            Some(ListPosition { list, line }) => {
+                RecordingError::Listed { list: dir.join(&**list), line: *line, file, fault }
+            }
             None => RecordingError::Picture { path: dir.join(file), fault },
         }
     }

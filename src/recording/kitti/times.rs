@@ -38,7 +38,7 @@ pub(super) fn timed_entries(
     let entries = pictures.into_iter().enumerate().map(|(index, (name, file))| {
         let number = name.split('.').next().and_then(|stem| stem.parse().ok()).unwrap_or(index);
         match times.get(number) {
-            Some((position, time_ns)) => Ok(Entry::new(*position, time_ns.clone(), Ok(file))),
+            Some((position, time_ns)) => Ok(Entry::new(position.clone(), time_ns.clone(), Ok(file))),
             None if options.keep_going => Ok(Entry { time_ns: None, source: PictureSource::from_path(file) }),
             None => Err(RecordingError::TooFewTimes {
                 list: dir.join(LIST),
