@@ -11,7 +11,7 @@ use super::timeline::MAX_LENGTH_NS;
 use crate::files::input;
 
 /// Maximum number of lines: nine hours at 30 frames per second.
-const MAX_ENTRIES: usize = 1_000_000;
+pub(super) const MAX_ENTRIES: usize = 1_000_000;
 
 /// Maximum number of characters that messages quote of faulty text.
 const QUOTED_CHARS: usize = 40;

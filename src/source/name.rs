@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion};
 use crate::capture::demo;
+use crate::recording::pictures;
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -46,7 +47,7 @@ pub enum SourceName {
     Synthetic,
     /// The demonstration: a loop of that scene with its depth, embedded in the program.
     Demo,
-    /// A folder with a recording.
+    /// A folder with a recording, or a pattern of pictures such as `DIR/IMG_%04d.jpg`.
     Folder(PathBuf),
     /// A PNG or JPEG.
     Photo(PathBuf),
@@ -100,10 +101,10 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
         }
-        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
-        false => "a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
+        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
+        false => "a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
     }
 }
 
@@ -204,6 +205,7 @@ impl SourceName {
             _ if path.is_file() => {
                 SourceError::usage_error(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
             }
+            _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
             Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
             None => Err(missing_folder_error(&path.display().to_string())),
@@ -260,11 +262,12 @@ impl SourceName {
         )))
     }
 
-    /// Returns the folder of a recording, or the file of a photo.
-    pub fn path(&self) -> Option<&Path> {
+    /// Returns the folders that a recording is read from, or the file of a photo.
+    pub fn input_paths(&self) -> Vec<PathBuf> {
         match self {
-            SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
-            _ => None,
+            SourceName::Folder(path) => pictures::input_folders(path),
+            SourceName::Photo(path) => vec![path.clone()],
+            _ => Vec::new(),
         }
     }
 

@@ -7,8 +7,9 @@ mod times;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder, find_numbered_pictures};
+use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::error::RecordingError;
+use super::folder::find_numbered_pictures;
 use super::geometry::Geometry;
 use super::list::{clear_unordered_times, refuse_faults};
 use super::{Options, StereoGeometry, Unpaired};
@@ -85,18 +86,16 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         depth: None,
     });
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
-    let stereo_geometry = match calibration {
-        Some(path) => {
-            StereoGeometry::Rectified(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig)
-        }
-        None => StereoGeometry::Uncalibrated,
+    let rig = match calibration {
+        Some(path) => Some(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig),
+        None => None,
     };
     Ok(Contents {
         frames: frames.collect(),
-        depth: None,
-        stereo_geometry: Some(stereo_geometry),
-        disparity_count: None,
+        stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, StereoGeometry::Rectified)),
         unpaired: Unpaired { right: right_alone.len(), ..Unpaired::default() },
+        has_times: dir.join(times::LIST).exists(),
+        ..Contents::default()
     })
 }
 

@@ -8,7 +8,7 @@ use crate::recording::error::RecordingError;
 use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quote};
 
-const LIST: &str = "times.txt";
+pub(super) const LIST: &str = "times.txt";
 
 /// Period without a list of times: 10 frames per second, the trigger rate of KITTI's cameras.
 const PERIOD_NS: u64 = 100_000_000;
@@ -18,7 +18,7 @@ const LAST_S: f64 = 1e10;
 
 /// Returns entries with times for `pictures` (name, file). A picture named by the number n has the time in line n (from
 /// 0) of `times.txt`, so that an excerpt may keep the full list; other names count by position. Without the list, the
-/// pictures are [`PERIOD_NS`] apart.
+/// pictures are [`Options::period_ns`] apart, else [`PERIOD_NS`].
 ///
 /// # Errors
 /// A picture has no time, and `keep_going` is not set.
@@ -28,8 +28,9 @@ pub(super) fn timed_entries(
     options: &Options,
 ) -> Result<Vec<Entry>, RecordingError> {
     if !dir.join(LIST).exists() {
+        let period_ns = options.period_ns.unwrap_or(PERIOD_NS);
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
-            time_ns: Some(index * PERIOD_NS),
+            time_ns: Some(index * period_ns),
             source: PictureSource::from_path(file),
         };
         return Ok((0..).zip(pictures).map(entry).collect());

@@ -9,7 +9,7 @@ use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource,
 use super::decode;
 use super::error::RecordingError;
 use super::geometry::Geometry;
-use super::{Options, StereoGeometry, Unpaired};
+use super::{Options, StereoGeometry};
 use crate::optics::StereoRig;
 
 pub(super) const LAYOUT: Layout = Layout {
@@ -50,7 +50,7 @@ fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents, RecordingErro
         depth: form,
         stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, |(rig, _)| StereoGeometry::Rectified(rig))),
         disparity_count: rig.and_then(|(_, count)| count),
-        unpaired: Unpaired::default(),
+        ..Contents::default()
     })
 }
 

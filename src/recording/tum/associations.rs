@@ -14,27 +14,23 @@ const NAMES: [&str; 6] =
 /// Maximum number of texts in a folder that are searched for pairs: more are data of another kind, such as poses.
 const MAX_TEXTS: usize = 8;
 
-/// Returns the name of the list of pairs in `dir`. Without a usual name and without other lists, it is the only text
-/// whose first line is a pair of pictures, such as `fr1_desk.txt`.
-pub(super) fn find_associations(dir: &Path) -> Option<String> {
+/// Returns the name of the list of pairs in `dir`, or several if it is ambiguous. Without a usual name and without
+/// other lists, it is the text whose first line is a pair of pictures, such as `fr1_desk.txt`.
+pub(super) fn find_associations(dir: &Path) -> Vec<String> {
     if let Some(name) = NAMES.into_iter().find(|name| dir.join(name).exists()) {
-        return Some(name.to_owned());
+        return vec![name.to_owned()];
     }
     if [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists()) {
-        return None;
+        return Vec::new();
     }
-    let names = fs::read_dir(dir).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    let texts: Vec<String> = names.filter(|name| name.ends_with(".txt")).take(MAX_TEXTS + 1).collect();
-    let mut lists = texts.iter().filter(|name| texts.len() <= MAX_TEXTS && begins_with_pair(&dir.join(name)));
-    match (lists.next(), lists.next()) {
-        (Some(only), None) => Some(only.clone()),
-        (Some(one), Some(other)) => {
-            let dir = dir.display();
-            tracing::warn!("{dir}: {one} and {other} both pair pictures; rename the right one to {ASSOCIATIONS}");
-            None
-        }
-        (None, _) => None,
+    let names = fs::read_dir(dir).into_iter().flatten().filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut lists: Vec<String> = names.filter(|name| name.ends_with(".txt")).take(MAX_TEXTS + 1).collect();
+    if lists.len() > MAX_TEXTS {
+        return Vec::new();
     }
+    lists.retain(|name| begins_with_pair(&dir.join(name)));
+    lists.sort_unstable();
+    lists
 }
 
 /// Returns whether the first line of a text, comments apart, names two pictures as pairs do.

@@ -17,17 +17,20 @@ const MAX_PICTURES: usize = 1000;
 
 /// Returns whether `dir` has a list of this layout.
 pub(super) fn is_tum_folder(dir: &Path) -> bool {
-    [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists()) || find_associations(dir).is_some()
+    [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists()) || !find_associations(dir).is_empty()
 }
 
 /// Reads the lists in `folder`.
 pub(super) fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let has = |list: &str| dir.join(list).exists();
-    match (find_associations(dir), has(COLOR_LIST), has(DEPTH_LIST)) {
-        (Some(list), ..) => from_associations(folder, &list, options),
-        (None, true, has_depth) => from_lists(dir, has_depth, options),
-        (None, false, _) => {
+    match (&find_associations(dir)[..], has(COLOR_LIST), has(DEPTH_LIST)) {
+        ([list], ..) => from_associations(folder, list, options),
+        ([one, other, ..], ..) => {
+            Err(RecordingError::TwoLists { dir: dir.clone(), lists: [one.clone(), other.clone()] })
+        }
+        ([], true, has_depth) => from_lists(dir, has_depth, options),
+        ([], false, _) => {
             Err(RecordingError::MissingList { dir: dir.clone(), missing: COLOR_LIST, present: DEPTH_LIST })
         }
     }
@@ -70,7 +73,7 @@ fn to_contents(frames: Vec<ListedFrame>, depth_options: Option<&Options>, unpair
         }
         DepthUnit::Inverse { white_is_far } => DepthFormat::Inverse { white_is_far },
     });
-    Contents { frames, depth, stereo_geometry: None, disparity_count: None, unpaired }
+    Contents { frames, depth, unpaired, has_times: true, ..Contents::default() }
 }
 
 /// Takes the pairs of the list of associations as they are; the colour picture determines the time of a frame.

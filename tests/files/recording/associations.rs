@@ -43,7 +43,7 @@ fn any_other_name_counts_if_it_is_the_only_list_of_pairs() {
     assert_eq!(scene.open().unwrap().len(), 2);
     // Two of them are ambiguous.
     scene.write("fr1_desk2.txt", PAIRS[0]);
-    assert_says(scene.open(), &["not a recording", "associations.txt"]);
+    assert_says(scene.open(), &["fr1_desk.txt and fr1_desk2.txt both pair pictures", "associations.txt"]);
     // The benchmark's own lists are preferred.
     scene.write("rgb.txt", "1.0 rgb/0.png\n");
     scene.remove("fr1_desk2.txt");
