@@ -1,7 +1,9 @@
 //! The layouts of the KITTI benchmarks, odometry (one sequence) and stereo, and their derivatives: a folder per camera,
-//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line.
+//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line; or single
+//! scenes, each with its calibration.
 
 pub(super) mod calib;
+mod scenes;
 mod times;
 
 use std::collections::HashSet;
@@ -72,6 +74,14 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         }
     }
 
+    let is_chosen_by_size = scenes::are_single(&names);
+    let (names, scenes_rig) = match is_chosen_by_size {
+        true => {
+            let scenes = scenes::choose(folder, folders.left, folders.camera, names, options)?;
+            (scenes.names, scenes.rig)
+        }
+        false => (names, None),
+    };
     let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", folders.left))));
     let mut entries = times::timed_entries(dir, pictures.collect(), options)?;
     clear_unordered_times(entries.iter_mut());
@@ -86,13 +96,14 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         depth: None,
     });
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
-    let rig = match calibration {
+    let rig = match calibration.filter(|_| scenes_rig.is_none()) {
         Some(path) => Some(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig),
-        None => None,
+        None => scenes_rig,
     };
     Ok(Contents {
         frames: frames.collect(),
         stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, StereoGeometry::Rectified)),
+        is_chosen_by_size,
         unpaired: Unpaired { right: right_alone.len(), ..Unpaired::default() },
         has_times: dir.join(times::LIST).exists(),
         ..Contents::default()
