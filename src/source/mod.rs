@@ -13,6 +13,7 @@
 //! ```
 
 pub mod calib;
+mod containers;
 pub mod devices;
 mod error;
 mod external_depth;

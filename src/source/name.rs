@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion};
+use super::{DepthOrigin, Frames, Source, SourceError, containers, photo, suggestion};
 use crate::capture::demo;
 use crate::recording::pictures;
 
@@ -197,6 +197,9 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
+            _ if path.is_file() && containers::is_container(path) => {
+                SourceError::usage_error(containers::describe_conversion(path))
+            }
             Some(text) if path.is_file() && is_video(path) => SourceError::usage_error(format!(
                 "a video must be split into pictures first; ffmpeg makes a folder of them, which is then the source: \
                  mkdir -p clip/rgb && ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk \
