@@ -7,7 +7,9 @@ mod kitti;
 mod layout;
 mod maps;
 mod middlebury;
+mod pictures;
 mod real;
+mod rgbd;
 mod still;
 mod writer;
 
