@@ -102,7 +102,8 @@ impl RecordingFolder {
     }
 
     fn within(&self, path: PathBuf, source: &PictureSource) -> Result<PathBuf, RecordingError> {
-        let is_inside = [Some(&self.root), self.maps_root.as_ref()].into_iter().flatten().any(|root| path.starts_with(root));
+        let is_inside =
+            [Some(&self.root), self.maps_root.as_ref()].into_iter().flatten().any(|root| path.starts_with(root));
         match self.follow_links || is_inside {
             true => Ok(path),
             false => Err(source.error(&self.dir, PictureFault::Outside)),
@@ -155,8 +156,7 @@ impl PictureSource {
     /// Returns the file, or the fault of the line that should name it.
     pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
         self.file.as_deref().map_err(|fault| {
-            let (list, line) =
-                self.position.as_ref().map_or((dir.to_owned(), 0), |at| (dir.join(&*at.list), at.line));
+            let (list, line) = self.position.as_ref().map_or((dir.to_owned(), 0), |at| (dir.join(&*at.list), at.line));
             RecordingError::Line { list, line, fault: fault.clone() }
         })
     }

@@ -38,7 +38,8 @@ pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Res
 
 /// Returns whether `folder` has a picture whose stem is `wanted`.
 pub(super) fn has_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool {
-    let mut names = fs::read_dir(folder).into_iter().flatten().filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names =
+        fs::read_dir(folder).into_iter().flatten().filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     names.any(|name| split_name(&name).is_some_and(|(stem, _)| wanted(stem)))
 }
 
@@ -138,7 +139,8 @@ pub(super) fn pair_by_name(
         let mut partners = index_by_key(dir, depth, &maps, by)?;
         // Numbers that occur twice must not take the first map that fits.
         index_by_key(dir, color, &names, by)?;
-        let pairs = names.iter().filter_map(|name| Some((name.clone(), partners.remove(&color.key(name, by)?)?.clone())));
+        let pairs =
+            names.iter().filter_map(|name| Some((name.clone(), partners.remove(&color.key(name, by)?)?.clone())));
         Ok::<Vec<_>, RecordingError>(pairs.collect())
     };
     let by_name = pair_by(PairKey::Name)?;

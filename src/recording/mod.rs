@@ -22,9 +22,9 @@ mod kitti;
 mod list;
 mod middlebury;
 mod pair;
-pub mod pictures;
 mod pfm;
 mod photo_metadata;
+pub mod pictures;
 mod rgbd;
 mod samples;
 mod timeline;
@@ -167,7 +167,8 @@ impl Recording {
         let (path, pattern_folder) = (dir, pictures::pattern_folder(dir));
         let dir = pattern_folder.unwrap_or(dir);
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
-        let mut folder = RecordingFolder { dir: dir.to_owned(), root, maps_root: None, follow_links: options.follow_links };
+        let mut folder =
+            RecordingFolder { dir: dir.to_owned(), root, maps_root: None, follow_links: options.follow_links };
         let not_a_recording =
             || RecordingError::NotARecording { dir: dir.to_owned(), expected_files: describe_expected_files() };
         let (layout, contents) = match pattern_folder {
@@ -300,7 +301,9 @@ impl Recording {
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
         let read = match form {
-            DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => decode::read_depth(&path, *units, Some(self.size), scratch, into),
+            DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
+                decode::read_depth(&path, *units, Some(self.size), scratch, into)
+            }
             DepthFormat::Inverse { white_is_far } => {
                 decode::read_inverse_depth(&path, *white_is_far, self.size, scratch, into)
             }

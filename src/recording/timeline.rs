@@ -16,7 +16,7 @@ pub(super) fn numbered_time_ns(index: u64, options: &Options) -> u64 {
 /// Describes the frame rate of a recording without times.
 pub(super) fn describe_rate(options: &Options) -> String {
     match options.period_ns {
-        Some(period_ns) => format!("{:.5} per second", 1e9 / period_ns as f64),
+        Some(period_ns) => format!("{} per second", (1e12 / period_ns as f64).round() / 1e3),
         None => "30 per second (--fps)".to_owned(),
     }
 }

@@ -103,7 +103,9 @@ fn accepted_sources() -> &'static str {
         true if cfg!(feature = "pipewire") => {
             "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
         }
-        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
+        true => {
+            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
+        }
         false => "a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
     }
 }

@@ -4,6 +4,7 @@ mod associations;
 mod euroc;
 mod faults;
 mod kitti;
+mod kitti_scenes;
 mod layout;
 mod maps;
 mod middlebury;

@@ -153,7 +153,8 @@ impl System {
             match name {
                 // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
-                    let recording = Recording::open(folder, &Reading { keep_going: true, ..self.options.recording_options() }).ok();
+                    let recording =
+                        Recording::open(folder, &Reading { keep_going: true, ..self.options.recording_options() }).ok();
                     let has = |own: &mut Vec<DepthMethod>, is: bool, depth_method: DepthMethod| {
                         own.extend(is.then_some(depth_method))
                     };

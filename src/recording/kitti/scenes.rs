@@ -51,7 +51,8 @@ pub(super) fn choose(
     };
     let sized: Vec<_> = names.into_iter().map(|name| (read_size(&name), name)).collect();
     let count = sized.len();
-    let chosen = options.size.filter(|size| sizes.contains_key(size)).or_else(|| sized.iter().find_map(|(size, _)| *size));
+    let chosen =
+        options.size.filter(|size| sizes.contains_key(size)).or_else(|| sized.iter().find_map(|(size, _)| *size));
     // A picture without a readable header is reported when it is read.
     let same_size = sized.into_iter().filter(|(size, _)| size.is_none_or(|size| Some(size) == chosen));
 

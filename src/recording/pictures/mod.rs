@@ -62,11 +62,7 @@ pub(super) fn open_pattern(
 }
 
 /// Creates the contents from pictures in this order, with their depth maps if there are any.
-fn from_names(
-    folder: &RecordingFolder,
-    names: Vec<String>,
-    options: &Options,
-) -> Result<Contents, RecordingError> {
+fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     if !options.keep_going {
         refuse_other_sizes(folder, &names)?;

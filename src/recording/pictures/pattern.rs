@@ -69,7 +69,9 @@ mod tests {
         assert_eq!(number("IMG_%04d.jpg", "IMG_12345.jpg"), Some(12345));
         assert_eq!(number("%d.png", "0.png"), Some(0));
         assert_eq!(number("100%%_%03d", "100%_007"), Some(7));
-        for name in ["IMG_12.jpg", "IMG_012345.jpg", "IMG_0012.png", "img_0012.jpg", "IMG_+012.jpg", "IMG_.jpg", "IMG_0"] {
+        for name in
+            ["IMG_12.jpg", "IMG_012345.jpg", "IMG_0012.png", "img_0012.jpg", "IMG_+012.jpg", "IMG_.jpg", "IMG_0"]
+        {
             assert_eq!(number("IMG_%04d.jpg", name), None, "{name}");
         }
         assert_eq!(number("%d", "99999999999999999999999"), None);

@@ -40,11 +40,12 @@ const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 3] = [
 
 /// Returns the kinds of the colour pictures and depth maps in `dir`, if it has both.
 fn find_pair(dir: &Path) -> Option<[Pictures<'static>; 2]> {
-    let shared = SHARED_FOLDERS.iter().map(|(folder, kinds)| {
-        kinds.map(|(prefix, suffix)| Pictures { folder: Path::new(folder), prefix, suffix })
-    });
+    let shared = SHARED_FOLDERS
+        .iter()
+        .map(|(folder, kinds)| kinds.map(|(prefix, suffix)| Pictures { folder: Path::new(folder), prefix, suffix }));
     let apart = COLOR_FOLDERS.iter().flat_map(|color| {
-        DEPTH_FOLDERS.map(|depth| [color, depth].map(|folder| Pictures { folder: Path::new(folder), prefix: "", suffix: "" }))
+        DEPTH_FOLDERS
+            .map(|depth| [color, depth].map(|folder| Pictures { folder: Path::new(folder), prefix: "", suffix: "" }))
     });
     apart.chain(shared).find(|pair| pair.iter().all(|kind| kind.exist_in(dir)))
 }
@@ -76,7 +77,8 @@ pub(super) fn from_pairs(
     let counts = [names.len(), maps.len()];
     let (pairs, by) = pair_by_name(dir, (color, names), (depth, maps))?;
     if pairs.is_empty() {
-        let [color, depth] = [dir.join(color.folder), maps_dir.join(depth.folder)].map(|path| path.display().to_string());
+        let [color, depth] =
+            [dir.join(color.folder), maps_dir.join(depth.folder)].map(|path| path.display().to_string());
         return Err(RecordingError::NoNumberPairs { dir: dir.to_owned(), color, depth });
     }
     let (format, unit) = depth_format(scale, options)?;
@@ -86,7 +88,10 @@ pub(super) fn from_pairs(
     let unpaired = Unpaired { color: counts[0] - pairs.len(), depth: counts[1] - pairs.len(), ..Unpaired::default() };
     if unpaired != Unpaired::default() {
         let Unpaired { color, depth, .. } = unpaired;
-        tracing::warn!("{}: left out: {color} pictures without depth, {depth} depth maps without picture", dir.display());
+        tracing::warn!(
+            "{}: left out: {color} pictures without depth, {depth} depth maps without picture",
+            dir.display()
+        );
     }
     let is_outside = maps_dir != dir;
     let frames = (0..).zip(&pairs).map(|(index, (name, map))| {

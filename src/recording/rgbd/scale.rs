@@ -72,7 +72,8 @@ impl Scale {
     pub(super) fn read(&self) -> Result<StatedUnits, RecordingError> {
         match self {
             Self::Millimetres => {
-                Ok(StatedUnits { per_m: 1000.0, invalid: Some(u16::MAX), origin: "assumed to be millimetres".to_owned() })
+                let origin = "assumed to be millimetres, 65535 unknown".to_owned();
+                Ok(StatedUnits { per_m: 1000.0, invalid: Some(u16::MAX), origin })
             }
             Self::Replica(None) => {
                 let origin = "assumed to be Replica, without cam_params.json".to_owned();

@@ -141,7 +141,10 @@ fn depth_follows_the_scale_and_the_value_for_unknown() {
     scene.depth("depth/0.png", SIZE, 0);
     assert!(read(&options).iter().all(|&metres| metres == 0.0));
     for depth_scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert_says(scene.open_with(&Options { depth_scale: Some(depth_scale), ..options }), &["depth scale", "units per metre"]);
+        assert_says(
+            scene.open_with(&Options { depth_scale: Some(depth_scale), ..options }),
+            &["depth scale", "units per metre"],
+        );
     }
 }
 

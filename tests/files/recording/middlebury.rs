@@ -114,7 +114,15 @@ fn half_a_pair_is_told() {
 fn a_folder_that_is_nothing_is_told_all_layouts() {
     let scene = Scene::new();
     let opened = Recording::open(&scene.path(""), &Options::default());
-    let layouts =
-        ["rgb.txt (TUM RGB-D)", "mav0/cam0", "(EuRoC/ASL)", "image_2 and image_3", "(KITTI)", "im0.png and im1.png", "color and depth", "PNG or JPEG"];
+    let layouts = [
+        "rgb.txt (TUM RGB-D)",
+        "mav0/cam0",
+        "(EuRoC/ASL)",
+        "image_2 and image_3",
+        "(KITTI)",
+        "im0.png and im1.png",
+        "color and depth",
+        "PNG or JPEG",
+    ];
     assert_says(opened, &[&["not a recording", "give the folder"], &layouts[..]].concat());
 }

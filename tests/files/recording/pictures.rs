@@ -122,7 +122,10 @@ fn maps_that_do_not_belong_leave_the_pictures_without_depth() {
     add_maps(&scene, "elsewhere", &["1.png"]);
     fs::create_dir(scene.path("take-depth")).unwrap();
     symlink(scene.path("elsewhere/1.png"), scene.path("take-depth/1.png")).unwrap();
-    assert_says(depth_of(&open(&scene, "take").unwrap(), 0), &["take-depth/1.png: ", "leads outside", "--follow-links"]);
+    assert_says(
+        depth_of(&open(&scene, "take").unwrap(), 0),
+        &["take-depth/1.png: ", "leads outside", "--follow-links"],
+    );
 }
 
 #[test]

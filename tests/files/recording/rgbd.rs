@@ -45,9 +45,11 @@ fn folders_that_people_have_are_paired_by_number() {
         with_names(12, |n| format!("rgb/{n:05}.jpg"), |n| format!("depth/{n:05}.png")),
         with_names(12, |n| format!("image/frame_{n}.png"), |n| format!("depth/depth_{n:04}.png")),
         with_names(12, |n| format!("images/{n}.jpeg"), |n| format!("depths/{n:03}.png")),
-        with_names(12, |n| format!("color/{n:06}_{:011}.jpg", 33 * u32::from(n)), |n| {
-            format!("depth/{n:06}_{:011}.png", 33 * u32::from(n))
-        }),
+        with_names(
+            12,
+            |n| format!("color/{n:06}_{:011}.jpg", 33 * u32::from(n)),
+            |n| format!("depth/{n:06}_{:011}.png", 33 * u32::from(n)),
+        ),
         with_names(12, |n| format!("frame-{n:06}.color.png"), |n| format!("frame-{n:06}.depth.png")),
         with_names(12, |n| format!("left{n:06}.png"), |n| format!("depth{n:06}.png")),
     ] {
