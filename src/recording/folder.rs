@@ -83,18 +83,27 @@ fn split_digits(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// A kind of pictures in a folder: those whose stems begin and end like this.
+/// A kind of pictures in a folder: those whose stems begin and end like this, with a number between.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pictures<'a> {
     pub(super) folder: &'a Path,
     pub(super) prefix: &'a str,
     pub(super) suffix: &'a str,
+    /// Whether any text may be between.
+    pub(super) is_any: bool,
 }
 
 impl<'a> Pictures<'a> {
+    /// Creates the kind of all pictures in `folder`.
+    pub(super) const fn all_in(folder: &'a Path) -> Self {
+        Self { folder, prefix: "", suffix: "", is_any: true }
+    }
+
     /// Returns the part of a stem between prefix and suffix; `None` for another kind of picture.
     fn middle<'b>(&self, stem: &'b str) -> Option<&'b str> {
-        stem.strip_prefix(self.prefix)?.strip_suffix(self.suffix)
+        let middle = stem.strip_prefix(self.prefix)?.strip_suffix(self.suffix)?;
+        let is_number = || !middle.is_empty() && middle.bytes().all(|byte| byte.is_ascii_digit());
+        (self.is_any || is_number()).then_some(middle)
     }
 
     /// Returns whether `dir` has such pictures.

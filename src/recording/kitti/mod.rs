@@ -74,7 +74,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         }
     }
 
-    let is_chosen_by_size = scenes::are_single(&names);
+    let is_chosen_by_size = scenes::are_single(dir, &names);
     let (names, scenes_rig) = match is_chosen_by_size {
         true => {
             let scenes = scenes::choose(folder, folders.left, folders.camera, names, options)?;

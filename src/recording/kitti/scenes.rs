@@ -24,9 +24,18 @@ pub(super) struct Scenes {
     pub(super) rig: Option<StereoRig>,
 }
 
-/// Returns whether the pictures are single scenes rather than a sequence.
-pub(super) fn are_single(names: &[String]) -> bool {
-    names.iter().all(|name| name.contains('_'))
+/// Returns whether the pictures `names` in `dir` are single scenes rather than a sequence: by their names, or because
+/// the first has a calibration of its own, as in the object benchmark.
+pub(super) fn are_single(dir: &Path, names: &[String]) -> bool {
+    let has_calibration = |name: &String| {
+        CALIBRATIONS.iter().any(|calibrations| dir.join(calibrations).join(calibration_of(name)).is_file())
+    };
+    names.iter().all(|name| name.contains('_')) || names.first().is_some_and(has_calibration)
+}
+
+/// Returns the name of the calibration of a picture's scene.
+fn calibration_of(picture: &str) -> String {
+    format!("{}.txt", picture.split(['_', '.']).next().unwrap_or_default())
 }
 
 /// Chooses the scenes of [`Options::size`] or else of the first one's size, and of those the ones with the calibration
@@ -61,17 +70,16 @@ pub(super) fn choose(
     let mut scenes = Scenes { names: Vec::new(), rig: None };
     for (_, name) in same_size {
         if let Some(calibrations) = &calibrations {
-            let scene = name.split('_').next().unwrap_or_default();
-            if !rigs.contains_key(scene) {
-                let file = calibrations.join(format!("{scene}.txt"));
-                let rig = match Geometry::read_with(&file, |text| calib::parse(text, camera)) {
+            let scene = calibration_of(&name);
+            if !rigs.contains_key(&scene) {
+                let rig = match Geometry::read_with(&calibrations.join(&scene), |text| calib::parse(text, camera)) {
                     Ok(geometry) => Some(geometry.rig),
                     Err(_) if options.keep_going => None,
                     Err(error) => return Err(error),
                 };
-                rigs.insert(scene.to_owned(), rig);
+                rigs.insert(scene.clone(), rig);
             }
-            let Some(rig) = rigs[scene] else { continue };
+            let Some(rig) = rigs[&scene] else { continue };
             if *scenes.rig.get_or_insert(rig) != rig {
                 continue;
             }

@@ -67,7 +67,7 @@ fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -
     if !options.keep_going {
         refuse_other_sizes(folder, &names)?;
     }
-    let pictures = Pictures { folder: Path::new(""), prefix: "", suffix: "" };
+    let pictures = Pictures::all_in(Path::new(""));
     if let Some((maps_dir, suffix)) = find_maps(dir) {
         let maps = Pictures { suffix, ..pictures };
         let maps_root = maps_dir.canonicalize().map_err(RecordingError::io("open the depth maps", &maps_dir))?;

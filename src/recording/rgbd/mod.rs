@@ -40,13 +40,12 @@ const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 3] = [
 
 /// Returns the kinds of the colour pictures and depth maps in `dir`, if it has both.
 fn find_pair(dir: &Path) -> Option<[Pictures<'static>; 2]> {
-    let shared = SHARED_FOLDERS
-        .iter()
-        .map(|(folder, kinds)| kinds.map(|(prefix, suffix)| Pictures { folder: Path::new(folder), prefix, suffix }));
-    let apart = COLOR_FOLDERS.iter().flat_map(|color| {
-        DEPTH_FOLDERS
-            .map(|depth| [color, depth].map(|folder| Pictures { folder: Path::new(folder), prefix: "", suffix: "" }))
+    let shared = SHARED_FOLDERS.iter().map(|(folder, kinds)| {
+        kinds.map(|(prefix, suffix)| Pictures { folder: Path::new(folder), prefix, suffix, is_any: false })
     });
+    let apart = COLOR_FOLDERS
+        .iter()
+        .flat_map(|color| DEPTH_FOLDERS.map(|depth| [color, depth].map(|folder| Pictures::all_in(Path::new(folder)))));
     apart.chain(shared).find(|pair| pair.iter().all(|kind| kind.exist_in(dir)))
 }
 

@@ -63,6 +63,21 @@ fn scenes_of_one_size_and_calibration_are_a_recording() {
     }
 }
 
+/// One picture a scene, named by its number alone.
+#[test]
+fn scenes_of_the_object_benchmark_are_known_by_their_calibrations() {
+    let scene = with_scenes(["image_2", "image_3"], "calib", &SCENES);
+    for eye in ["image_2", "image_3"] {
+        for number in 0..SCENES.len() {
+            scene.remove(&format!("{eye}/{number:06}_11.png"));
+            let [from, to] = ["_10", ""].map(|time| scene.path(&format!("{eye}/{number:06}{time}.png")));
+            fs::rename(from, to).unwrap();
+        }
+    }
+    let recording = scene.open().unwrap();
+    assert_eq!((shades(&recording), focal_px(&recording)), (vec![0, 2], 700.0));
+}
+
 #[test]
 fn the_size_chooses_scenes() {
     let scene = with_scenes(["image_2", "image_3"], "calib_cam_to_cam", &SCENES);

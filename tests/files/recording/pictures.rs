@@ -38,6 +38,7 @@ fn shades(recording: &Recording) -> Vec<u8> {
 fn pictures_are_in_natural_order() {
     for names in [
         &["1.png", "2.png", "10.png"][..],
+        &["depth-of-field.png", "frame-1.color.png", "left-hand.png"],
         &["IMG_0009.PNG", "IMG_0010.png", "img_0011.png"],
         &["anna.png", "berta.png", "clara 2.png", "clara 10.png"],
     ] {
