@@ -31,7 +31,9 @@ pub enum RecordingError {
         present: &'static str,
     },
     /// Several lists pair colour with depth, and none has a usual name.
-    #[error("{}: {} and {} both pair pictures; rename the right one to associations.txt", dir.display(), lists[0], lists[1])]
+    #[error(
+        "{}: {} and {} both pair pictures; rename the right one to associations.txt", dir.display(), lists[0], lists[1]
+    )]
     TwoLists {
         dir: PathBuf,
         /// The names of two of them.

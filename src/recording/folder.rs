@@ -46,7 +46,7 @@ pub(super) fn has_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool
 /// Returns the names of the pictures whose stems consist of digits and `_`, in numeric order.
 ///
 /// # Errors
-/// Same as for [`find_pictures`]; or there is none.
+/// Same as for [`find_pictures`]; or there are no such pictures.
 pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
     let is_number = |stem: &str| stem.bytes().all(|byte| byte.is_ascii_digit() || byte == b'_');
     let names = find_pictures(folder, is_number)?;
@@ -66,7 +66,7 @@ fn natural_key(name: &str) -> String {
     key
 }
 
-/// Returns the numbers in a stem, without leading zeros; `None` if there is none.
+/// Returns the numbers in a stem, without leading zeros; `None` for a stem without numbers.
 fn number_key(stem: &str) -> Option<String> {
     let numbers = split_digits(stem).filter(|run| run.starts_with(|c: char| c.is_ascii_digit()));
     let numbers: Vec<&str> = numbers.map(|run| run.trim_start_matches('0')).collect();

@@ -23,27 +23,29 @@ pub(super) fn describe_conversion(path: &Path) -> String {
     let (file, dir) = (path.display(), folder.display());
     match extension(path).as_str() {
         "bag" => format!(
-            "a ROS bag must become a folder of pictures first; RealSense's does with Open3D (pip install open3d): python3 \
-             -c \"import open3d; open3d.t.io.RSBagReader.create('{file}').save_frames('{dir}')\" writes {dir}/color and \
-             {dir}/depth; others: rosbags-convert --src '{file}' --dst '{dir}-mcap' --dst-storage mcap, then as for .mcap"
+            "a ROS bag must become a folder of pictures first; RealSense's does with Open3D (pip install open3d): \
+             python3 -c \"import open3d; open3d.t.io.RSBagReader.create('{file}').save_frames('{dir}')\" writes \
+             {dir}/color and {dir}/depth; others: rosbags-convert --src '{file}' --dst '{dir}-mcap' --dst-storage \
+             mcap, then as for .mcap"
         ),
         "db3" | "mcap" => format!(
-            "a ROS 2 recording must become a folder of pictures first: write its colour topic to {dir}/color/000000.png and \
-             so on, and its depth topic to {dir}/depth/000000.png (16-bit grey, millimetres), for example with the Python \
-             package rosbags; {dir} is then the source"
+            "a ROS 2 recording must become a folder of pictures first: write its colour topic to \
+             {dir}/color/000000.png and so on, and its depth topic to {dir}/depth/000000.png (16-bit grey, \
+             millimetres), for example with the Python package rosbags; {dir} is then the source"
         ),
         "svo" | "svo2" => format!(
-            "a ZED recording must become a folder of pictures first: mkdir '{dir}' && ZED_SVO_Export '{file}' '{dir}' 4 (of \
-             the ZED SDK's samples) writes {dir}/left000000.png and {dir}/depth000000.png; {dir} is then the source"
+            "a ZED recording must become a folder of pictures first: mkdir '{dir}' && ZED_SVO_Export '{file}' '{dir}' \
+             4 (of the ZED SDK's samples) writes {dir}/left000000.png and {dir}/depth000000.png; {dir} is then the \
+             source"
         ),
         "r3d" => format!(
             "a Record3D recording must become a folder of pictures first: unzip '{file}' -d '{dir}', then write each \
-             {dir}/rgbd/N.depth (LZFSE of 32-bit metres; Python package pyliblzfse) to {dir}/depth/N.png (16-bit grey, \
-             millimetres) and move {dir}/rgbd/N.jpg to {dir}/color; {dir} is then the source"
+             {dir}/rgbd/N.depth (LZFSE of 32-bit metres; Python package pyliblzfse) to {dir}/depth/N.png (16-bit \
+             grey, millimetres) and move {dir}/rgbd/N.jpg to {dir}/color; {dir} is then the source"
         ),
         _ => format!(
-            "a recording of Azure Kinect must become a folder of pictures first: k4a_mkv2image -i='{file}' -s=false -t=true \
-             writes {dir}/color and {dir}/depth, aligned; {dir} is then the source"
+            "a recording of Azure Kinect must become a folder of pictures first: k4a_mkv2image -i='{file}' -s=false \
+             -t=true writes {dir}/color and {dir}/depth, aligned; {dir} is then the source"
         ),
     }
 }

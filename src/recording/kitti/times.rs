@@ -7,6 +7,7 @@ use crate::recording::contents::PictureSource;
 use crate::recording::error::RecordingError;
 use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quote};
+use crate::recording::timeline::given_period_ns;
 
 pub(super) const LIST: &str = "times.txt";
 
@@ -28,7 +29,7 @@ pub(super) fn timed_entries(
     options: &Options,
 ) -> Result<Vec<Entry>, RecordingError> {
     if !dir.join(LIST).exists() {
-        let period_ns = options.period_ns.unwrap_or(PERIOD_NS);
+        let period_ns = given_period_ns(options).unwrap_or(PERIOD_NS);
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
             time_ns: Some(index * period_ns),
             source: PictureSource::from_path(file),

@@ -51,6 +51,11 @@ fn pictures_are_in_natural_order() {
         assert_eq!(times_ns(&recording)[..3], [0, 33_333_333, 66_666_666]);
         let options = Options { period_ns: Some(40_000_000), ..Options::default() };
         assert_eq!(Recording::open(&scene.path("take"), &options).unwrap().period_ns(), 40_000_000);
+        for period_ns in [0, u64::MAX] {
+            let options = Options { period_ns: Some(period_ns), ..Options::default() };
+            let recording = Recording::open(&scene.path("take"), &options).unwrap();
+            assert!(times_ns(&recording).is_sorted_by(|one, next| one < next) && recording.period_ns() > 0);
+        }
     }
 }
 
