@@ -38,10 +38,11 @@ pub fn recording(data: &[u8]) {
     let options = Options {
         keep_going: flags & 1 != 0,
         pair_tolerance_ns: if flags & 2 != 0 { u64::MAX } else { 20_000_000 },
-        depth_scale: if flags & 4 != 0 { 1e-38 } else { 5000.0 },
+        depth_scale: (flags & 4 != 0).then_some(1e-38),
         depth_unit: if flags & 16 != 0 { DepthUnit::Inverse } else { DepthUnit::Metres },
         depth_invert: flags & 32 != 0,
         depth_invalid: (flags & 8 != 0).then_some(65535),
+        ..Options::default()
     };
     match Recording::open(&file_path(folder), &options) {
         Ok(recording) => check_recording(&recording),

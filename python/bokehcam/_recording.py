@@ -39,7 +39,7 @@ class Recording(Sequence[Frame]):
 
     Args:
         path: The folder.
-        depth_scale: Units of 16-bit depth pictures per metre, > 0.
+        depth_scale: Units of 16-bit depth pictures per metre, > 0; ``None`` for those of the layout.
         depth_invalid: A value of these that means unknown; 0 always does.
         keep_going: Faulty lines of its lists become frames whose reading fails; otherwise the first one fails now.
 
@@ -53,7 +53,7 @@ class Recording(Sequence[Frame]):
         self,
         path: Union[str, "os.PathLike[str]"],
         *,
-        depth_scale: float = 5000.0,
+        depth_scale: Optional[float] = None,
         depth_invalid: Optional[int] = None,
         keep_going: bool = False,
     ):
@@ -118,5 +118,5 @@ class Recording(Sequence[Frame]):
         return f"<Recording {self.path!r}: {self.layout}, {len(self)} frames of {width}x{height}>"
 
 
-def _open(path: str, depth_scale: float, depth_invalid: Optional[int], keep_going: bool) -> Recording:
+def _open(path: str, depth_scale: Optional[float], depth_invalid: Optional[int], keep_going: bool) -> Recording:
     return Recording(path, depth_scale=depth_scale, depth_invalid=depth_invalid, keep_going=keep_going)

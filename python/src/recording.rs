@@ -22,7 +22,7 @@ impl Recording {
     fn new(
         py: Python<'_>,
         path: PathBuf,
-        depth_scale: f32,
+        depth_scale: Option<f32>,
         depth_invalid: Option<u16>,
         keep_going: bool,
     ) -> PyResult<Self> {

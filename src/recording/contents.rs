@@ -1,8 +1,8 @@
 //! The common form of all layouts: frames whose pictures are still on disk.
 
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::decode::DepthUnits;
@@ -24,7 +24,7 @@ pub(super) struct Layout {
 }
 
 /// The content of a recording.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Contents {
     pub(super) frames: Vec<ListedFrame>,
     pub(super) depth: Option<DepthFormat>,
@@ -32,6 +32,12 @@ pub(super) struct Contents {
     /// Number of disparities to search, from 0, if stated: a multiple of 16.
     pub(super) disparity_count: Option<u32>,
     pub(super) unpaired: Unpaired,
+    /// Whether times are recorded; otherwise [`Options::period_ns`] counts.
+    pub(super) has_times: bool,
+    /// Whether these are scenes that [`Options::size`] has chosen.
+    pub(super) is_chosen_by_size: bool,
+    /// A folder of depth maps outside the recording's, with all links resolved.
+    pub(super) maps_root: Option<PathBuf>,
 }
 
 /// A frame of a list. Known times increase strictly.
@@ -47,6 +53,8 @@ pub(super) struct ListedFrame {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DepthFormat {
     Units(DepthUnits),
+    /// The same, in units that the layout states.
+    StatedUnits(DepthUnits),
     /// Relative inverse depth in grey pictures: black is the farthest and white the nearest, or the other way round.
     Inverse {
         white_is_far: bool,
@@ -56,13 +64,14 @@ pub(super) enum DepthFormat {
 }
 
 impl DepthFormat {
-    /// Returns the format of depth pictures that are read with `options`.
-    pub(super) fn of_pictures(options: &Options) -> Self {
-        let scaled = |scale| Self::Units(DepthUnits { scale, invalid: options.depth_invalid });
+    /// Returns the format of depth pictures that are read with `options`, and have `scale` units per metre by default.
+    pub(super) fn of_pictures(options: &Options, scale: f32) -> Self {
         match options.depth_unit {
             DepthUnit::Inverse => Self::Inverse { white_is_far: options.depth_invert },
-            DepthUnit::PerMetre(scale) => scaled(scale),
-            DepthUnit::Metres | DepthUnit::Disparity => scaled(options.depth_scale),
+            unit => {
+                let scale = unit.units_per_m().or(options.depth_scale).unwrap_or(scale);
+                Self::Units(DepthUnits { scale, invalid: options.depth_invalid })
+            }
         }
     }
 }
@@ -72,14 +81,19 @@ impl DepthFormat {
 pub(super) struct RecordingFolder {
     /// The path as given, for messages.
     pub(super) dir: PathBuf,
-    /// The path with all links resolved: no picture may lie outside it.
+    /// The path with all links resolved: no picture may lie outside it, unless links are followed.
     pub(super) root: PathBuf,
+    /// The same for a folder of depth maps outside, if there is one.
+    pub(super) maps_root: Option<PathBuf>,
+    /// Whether links may lead outside.
+    pub(super) follow_links: bool,
 }
 
 /// A line of a list, for messages.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ListPosition {
-    pub(super) list: &'static str,
+    /// Its file, relative to the recording's folder; shared by all lines.
+    pub(super) list: Arc<str>,
     pub(super) line: u32,
 }
 
@@ -101,7 +115,12 @@ impl RecordingFolder {
     }
 
     fn within(&self, path: PathBuf, source: &PictureSource) -> Result<PathBuf, RecordingError> {
-        if path.starts_with(&self.root) { Ok(path) } else { Err(source.error(&self.dir, PictureFault::Outside)) }
+        let is_inside =
+            [Some(&self.root), self.maps_root.as_ref()].into_iter().flatten().any(|root| path.starts_with(root));
+        match self.follow_links || is_inside {
+            true => Ok(path),
+            false => Err(source.error(&self.dir, PictureFault::Outside)),
+        }
     }
 }
 
@@ -150,8 +169,7 @@ impl PictureSource {
     /// Returns the file, or the fault of the line that should name it.
     pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
         self.file.as_deref().map_err(|fault| {
-            let (list, line) =
-                self.position.map_or((dir.to_owned(), 0), |position| (dir.join(position.list), position.line));
+            let (list, line) = self.position.as_ref().map_or((dir.to_owned(), 0), |at| (dir.join(&*at.list), at.line));
             RecordingError::Line { list, line, fault: fault.clone() }
         })
     }
@@ -159,28 +177,11 @@ impl PictureSource {
     /// Returns the error for a picture with `fault`, with the line that names it.
     pub(super) fn error(&self, dir: &Path, fault: PictureFault) -> RecordingError {
         let file = self.file.clone().unwrap_or_default();
-        match self.position {
-            Some(ListPosition { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
+        match &self.position {
+            Some(ListPosition { list, line }) => {
+                RecordingError::Listed { list: dir.join(&**list), line: *line, file, fault }
+            }
             None => RecordingError::Picture { path: dir.join(file), fault },
         }
     }
-}
-
-/// Returns the names of the PNG and JPEG files in `folder` whose stems consist of digits and `_`, in numeric order.
-///
-/// # Errors
-/// The folder cannot be listed, or contains no such file.
-pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
-    let is_picture = |name: &String| {
-        let (stem, extension) = name.rsplit_once('.').unwrap_or_default();
-        !stem.is_empty()
-            && stem.bytes().all(|byte| byte.is_ascii_digit() || byte == b'_')
-            && ["png", "jpg", "jpeg"].iter().any(|known| extension.eq_ignore_ascii_case(known))
-    };
-    let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
-    let entries: Vec<_> = entries.map_err(RecordingError::io("list", folder))?;
-    let mut names: Vec<_> = entries.into_iter().filter_map(|name| name.into_string().ok()).filter(is_picture).collect();
-    // Shorter names first, so that numbers without leading zeros are sorted correctly.
-    names.sort_unstable_by(|a, b| (a.len(), a).cmp(&(b.len(), b)));
-    if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
 }

@@ -30,6 +30,15 @@ pub enum RecordingError {
         /// The list that exists.
         present: &'static str,
     },
+    /// Several lists pair colour with depth, and none has a usual name.
+    #[error(
+        "{}: {} and {} both pair pictures; rename the right one to associations.txt", dir.display(), lists[0], lists[1]
+    )]
+    TwoLists {
+        dir: PathBuf,
+        /// The names of two of them.
+        lists: [String; 2],
+    },
     /// A list has no entries.
     #[error("{}: the list names no picture; add lines of `time file`, or remove the list", list.display())]
     EmptyList { list: PathBuf },
@@ -43,6 +52,52 @@ pub enum RecordingError {
     /// A folder that serves as a list has no pictures.
     #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
     EmptyFolder { folder: PathBuf },
+    /// A folder has too many files.
+    #[error("{}: the folder has more than {most} pictures; split it", folder.display())]
+    CrowdedFolder {
+        folder: PathBuf,
+        /// The maximum number of pictures.
+        most: usize,
+    },
+    /// No picture has a name of the pattern.
+    #[error("{}: no picture has a name like {pattern}; correct the pattern, or give the folder", folder.display())]
+    NoMatch {
+        folder: PathBuf,
+        /// The pattern of the file names.
+        pattern: String,
+    },
+    /// Two pictures of one kind have the same name or number.
+    #[error("{}: its name or number is also that of {other}; remove or rename one of them", path.display())]
+    SameNumber {
+        path: PathBuf,
+        /// The name of the other picture.
+        other: String,
+    },
+    /// No depth map has the name or number of a colour picture.
+    #[error(
+        "{}: no depth map in {depth} has the name or number of a colour picture in {color}; number both alike, or pair \
+         them in associations.txt (lines of `time file time file`)", dir.display()
+    )]
+    NoNumberPairs {
+        dir: PathBuf,
+        /// The folder of colour pictures.
+        color: String,
+        /// The folder of depth maps.
+        depth: String,
+    },
+    /// A film must be converted first.
+    #[error(
+        "{0}/rgb.mp4: split it into pictures first, and give the folder again: mkdir '{0}/rgb' && ffmpeg -i \
+         '{0}/rgb.mp4' -fps_mode passthrough -start_number 0 '{0}/rgb/%06d.png'", dir.display()
+    )]
+    Film { dir: PathBuf },
+    /// The file that states the depth scale is invalid.
+    #[error("{}: {what}; correct it, or give the units per metre with --depth-scale", file.display())]
+    StatedScale {
+        file: PathBuf,
+        /// The fault.
+        what: String,
+    },
     /// One camera of a pair is missing.
     #[error("{}: {missing} is missing beside {present}; restore the pictures of the other camera", dir.display())]
     MissingEye {

@@ -93,7 +93,7 @@ pub enum PictureFault {
     )]
     Dark,
     /// A link leads outside the recording.
-    #[error("a link leads outside the recording; put the file itself inside the folder")]
+    #[error("a link leads outside the recording; add --follow-links if you trust it, or put the file itself there")]
     Outside,
     /// A folder, a pipe or a device.
     #[error("not a regular file; name a picture file")]

@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 use super::contents::{ListPosition, PictureSource};
 use super::error::RecordingError;
@@ -10,7 +11,7 @@ use super::timeline::MAX_LENGTH_NS;
 use crate::files::input;
 
 /// Maximum number of lines: nine hours at 30 frames per second.
-const MAX_ENTRIES: usize = 1_000_000;
+pub(super) const MAX_ENTRIES: usize = 1_000_000;
 
 /// Maximum number of characters that messages quote of faulty text.
 const QUOTED_CHARS: usize = 40;
@@ -44,7 +45,7 @@ impl Entry {
 /// The list is unreadable, empty, or has more than [`MAX_ENTRIES`] lines.
 pub(super) fn read_list<T>(
     dir: &Path,
-    list: &'static str,
+    list: &str,
     parse: impl Fn(ListPosition, Result<&str, LineFault>) -> T,
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
@@ -53,7 +54,9 @@ pub(super) fn read_list<T>(
     if split_lines(&bytes).nth(MAX_ENTRIES).is_some() {
         return Err(RecordingError::LongList { list: path, most: MAX_ENTRIES });
     }
-    let entries: Vec<T> = split_lines(&bytes).map(|(line, text)| parse(ListPosition { list, line }, text)).collect();
+    let list: Arc<str> = list.into();
+    let position = |line| ListPosition { list: Arc::clone(&list), line };
+    let entries: Vec<T> = split_lines(&bytes).map(|(line, text)| parse(position(line), text)).collect();
     if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
 }
 

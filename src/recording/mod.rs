@@ -1,7 +1,7 @@
 //! Recordings on disk, read and written frame by frame, and single pictures ([`still`], [`snapshot`]).
 //!
 //! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
-//! `euroc` and `middlebury` can be read, and are stereo.
+//! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists.
 
 pub mod depth_file;
 pub mod geometry;
@@ -17,13 +17,17 @@ mod encode;
 mod error;
 mod euroc;
 mod fault;
+mod folder;
 mod jpeg;
 mod kitti;
 mod list;
 mod middlebury;
+mod options;
 mod pair;
 mod pfm;
 mod photo_metadata;
+pub mod pictures;
+mod rgbd;
 mod samples;
 mod timeline;
 mod unit;
@@ -36,6 +40,7 @@ pub use decode::Scratch;
 pub use depth_file::{DepthUnit, covers as depth_covers};
 pub use error::RecordingError;
 pub use fault::{GeometryFault, LineFault, PictureFault};
+pub use options::Options;
 pub use photo_metadata::PhotoMetadata;
 
 use crate::calibration::StereoCalibration;
@@ -44,43 +49,12 @@ use crate::optics::StereoRig;
 use contents::{DepthFormat, Layout, Locator, PictureSource, RecordingFolder};
 
 /// The supported layouts, in order of detection.
-const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
+const LAYOUTS: [Layout; 6] =
+    [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT, rgbd::LAYOUT, pictures::LAYOUT];
 
 /// Maximum width and height; larger pictures are rejected by their header, before memory is allocated. Reading the
 /// largest takes at most four times the 192 MiB of its RGB.
 const MAX_SIDE_PX: u32 = 8192;
-
-/// Options for reading a recording.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Units of the depth pictures per metre, > 0.
-    pub depth_scale: f32,
-    /// The meaning of the values in depth pictures: distances, or relative inverse depth from 0 to the largest value.
-    pub depth_unit: DepthUnit,
-    /// Whether white is the farthest in relative inverse depth, instead of the nearest.
-    pub depth_invert: bool,
-    /// A depth value that means unknown; 0 always does.
-    pub depth_invalid: Option<u16>,
-    /// Largest time difference between a colour picture and its depth map or right picture, in nanoseconds.
-    pub pair_tolerance_ns: u64,
-    /// Whether faulty lines of lists and missing right pictures become frames that fail to read. Otherwise the first
-    /// one fails [`Recording::open`].
-    pub keep_going: bool,
-}
-
-impl Default for Options {
-    /// Values of the TUM benchmark: 5000 units per metre, pairs within 20 ms. Faulty lists are rejected.
-    fn default() -> Self {
-        Self {
-            depth_scale: tum::DEPTH_SCALE,
-            depth_unit: DepthUnit::Metres,
-            depth_invert: false,
-            depth_invalid: None,
-            pair_tolerance_ns: 20_000_000,
-            keep_going: false,
-        }
-    }
-}
 
 /// Counts of listed pictures that belong to no frame, because no counterpart is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,6 +94,8 @@ pub struct Recording {
     stereo_geometry: Option<StereoGeometry>,
     disparity_count: Option<u32>,
     unpaired: Unpaired,
+    has_times: bool,
+    is_chosen_by_size: bool,
 }
 
 /// A frame whose pictures are on disk.
@@ -132,21 +108,31 @@ struct Frame {
 }
 
 impl Recording {
-    /// Opens the recording in the folder `dir`. Reads its lists, and the headers of pictures where needed.
+    /// Opens the recording in the folder `dir`, or the pictures of a pattern such as `DIR/IMG_%04d.jpg`. Reads its
+    /// lists, and the headers of pictures where needed.
     ///
     /// # Errors
     /// The folder is not a recording, or a list is missing or empty; no depth map or right picture pairs with a colour
     /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture is readable (reports
     /// the first). Without `keep_going` also any faulty line of a list, and a missing right picture.
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
-        check_depth_scale(options.depth_scale)?;
+        options.depth_scale.map_or(Ok(()), check_depth_scale)?;
+        let (path, pattern_folder) = (dir, pictures::pattern_folder(dir));
+        let dir = pattern_folder.unwrap_or(dir);
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
-        let folder = RecordingFolder { dir: dir.to_owned(), root };
+        let mut folder =
+            RecordingFolder { dir: dir.to_owned(), root, maps_root: None, follow_links: options.follow_links };
         let not_a_recording =
             || RecordingError::NotARecording { dir: dir.to_owned(), expected_files: describe_expected_files() };
-        let layout = LAYOUTS.iter().find(|layout| (layout.matches_folder)(dir)).ok_or_else(not_a_recording)?;
-        let contents = (layout.open)(&folder, options)?;
+        let (layout, contents) = match pattern_folder {
+            Some(_) => (&pictures::LAYOUT, pictures::open_pattern(&folder, path, options)?),
+            None => {
+                let layout = LAYOUTS.iter().find(|layout| (layout.matches_folder)(dir)).ok_or_else(not_a_recording)?;
+                (layout, (layout.open)(&folder, options)?)
+            }
+        };
 
+        folder.maps_root = contents.maps_root;
         let size = read_first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
@@ -163,6 +149,8 @@ impl Recording {
             stereo_geometry: contents.stereo_geometry,
             disparity_count: contents.disparity_count,
             unpaired: contents.unpaired,
+            has_times: contents.has_times,
+            is_chosen_by_size: contents.is_chosen_by_size,
         })
     }
 
@@ -205,7 +193,17 @@ impl Recording {
         matches!(self.depth, Some(DepthFormat::Inverse { .. }))
     }
 
-    /// Returns whether its depth is in the units of [`Options::depth_scale`].
+    /// Returns whether its times are recorded, so that [`Options::period_ns`] does not count.
+    pub fn has_times(&self) -> bool {
+        self.has_times
+    }
+
+    /// Returns whether [`Options::size`] chose its scenes.
+    pub fn is_chosen_by_size(&self) -> bool {
+        self.is_chosen_by_size
+    }
+
+    /// Returns whether its depth is in the units of [`Options::depth_scale`], and not in units that it states itself.
     pub fn has_depth_in_units(&self) -> bool {
         matches!(self.depth, Some(DepthFormat::Units(_)))
     }
@@ -256,7 +254,9 @@ impl Recording {
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
         let read = match form {
-            DepthFormat::Units(units) => decode::read_depth(&path, *units, Some(self.size), scratch, into),
+            DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
+                decode::read_depth(&path, *units, Some(self.size), scratch, into)
+            }
             DepthFormat::Inverse { white_is_far } => {
                 decode::read_inverse_depth(&path, *white_is_far, self.size, scratch, into)
             }

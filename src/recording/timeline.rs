@@ -1,10 +1,31 @@
 //! Times and frame period of a recording.
 
+use super::Options;
+use super::list::MAX_ENTRIES;
+
 /// Period of a recording with fewer than two known times: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
 /// Maximum length of a recording, ten years: keeps arithmetic with times and periods far from overflow.
 pub(super) const MAX_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;
+
+/// Returns the time of picture `index` of a recording without times.
+pub(super) fn numbered_time_ns(index: u64, options: &Options) -> u64 {
+    index * given_period_ns(options).unwrap_or(DEFAULT_PERIOD_NS)
+}
+
+/// Returns the period that the options give, within bounds: times increase, and even long recordings do not overflow.
+pub(super) fn given_period_ns(options: &Options) -> Option<u64> {
+    options.period_ns.map(|period_ns| period_ns.clamp(1, MAX_LENGTH_NS / MAX_ENTRIES as u64))
+}
+
+/// Describes the frame rate of a recording without times.
+pub(super) fn describe_rate(options: &Options) -> String {
+    match given_period_ns(options) {
+        Some(period_ns) => format!("{} per second", (1e12 / period_ns as f64).round() / 1e3),
+        None => "30 per second (--fps)".to_owned(),
+    }
+}
 
 /// Returns the median interval of strictly increasing times; [`DEFAULT_PERIOD_NS`] if there are fewer than two.
 pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u64 {

@@ -37,7 +37,7 @@ pub(super) fn add_external_depth(
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
-            let recording = Recording::open(folder, &request.recording_options()?)?;
+            let recording = Recording::open(folder, &request.options.recording_options())?;
             let depth_from = recorded_depth_origin(&recording);
             request.check_relative_depth(depth_from)?;
             first_depth = request.read_first_depth(&recording);

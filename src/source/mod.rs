@@ -13,6 +13,7 @@
 //! ```
 
 pub mod calib;
+mod containers;
 pub mod devices;
 mod error;
 mod external_depth;
@@ -177,6 +178,9 @@ impl Source {
         let Options { frames, stereo, depth_choice, computing, .. } = request.options;
         name.check_frames(frames)?;
         request.check_effect()?;
+        if request.options.depth.depth_unit == Some(DepthUnit::Disparity) && !matches!(name, SourceName::Photo(_)) {
+            return Err(SourceError::Usage("--depth-unit disparity is only for the depth map of a photo".to_owned()));
+        }
         let mut source = Opened::open(name, request)?;
         if stereo.side_by_side {
             let usage = |error: CaptureError| SourceError::Usage(error.to_string());
@@ -243,26 +247,25 @@ impl Source {
     }
 }
 
-impl OpenRequest<'_> {
-    /// Returns the options for reading a recording with depth pictures.
-    fn recording_options(&self) -> Result<Reading, SourceError> {
-        let Options { depth, keep_going, .. } = self.options;
-        let depth_unit = depth.depth_unit.unwrap_or(DepthUnit::Metres);
-        if depth_unit == DepthUnit::Disparity {
-            return SourceError::usage_error(
-                "--depth-unit disparity is for the depth map of a photo, not for recordings",
-            );
-        }
-        Ok(Reading {
-            depth_scale: depth.file_scale(),
-            depth_unit,
+impl Options {
+    /// Returns the options for reading a recording.
+    pub fn recording_options(&self) -> Reading {
+        let Self { frames, depth, keep_going, .. } = self;
+        Reading {
+            depth_scale: depth.depth_scale,
+            depth_unit: depth.depth_unit.unwrap_or(DepthUnit::Metres),
             depth_invert: depth.depth_invert,
             depth_invalid: Some(depth.depth_invalid),
+            period_ns: frames.fps.map(|fps| (1e9 / fps) as u64),
+            size: frames.size.map(|size| (size.width, size.height)),
+            follow_links: frames.follow_links,
             keep_going: *keep_going,
             ..Reading::default()
-        })
+        }
     }
+}
 
+impl OpenRequest<'_> {
     /// Returns whether the effect uses depth.
     pub fn uses_depth(&self) -> bool {
         self.look.is_none_or(|look| look.effect.follows_depth())

@@ -5,8 +5,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion};
+use super::{DepthOrigin, Frames, Source, SourceError, containers, photo, suggestion};
 use crate::capture::demo;
+use crate::recording::pictures;
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -46,7 +47,7 @@ pub enum SourceName {
     Synthetic,
     /// The demonstration: a loop of that scene with its depth, embedded in the program.
     Demo,
-    /// A folder with a recording.
+    /// A folder with a recording, or a pattern of pictures such as `DIR/IMG_%04d.jpg`.
     Folder(PathBuf),
     /// A PNG or JPEG.
     Photo(PathBuf),
@@ -100,10 +101,12 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
         }
-        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
-        false => "a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
+        true => {
+            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
+        }
+        false => "a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
     }
 }
 
@@ -196,6 +199,9 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
+            _ if path.is_file() && containers::is_container(path) => {
+                SourceError::usage_error(containers::describe_conversion(path))
+            }
             Some(text) if path.is_file() && is_video(path) => SourceError::usage_error(format!(
                 "a video must be split into pictures first; ffmpeg makes a folder of them, which is then the source: \
                  mkdir -p clip/rgb && ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk \
@@ -204,6 +210,7 @@ impl SourceName {
             _ if path.is_file() => {
                 SourceError::usage_error(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
             }
+            _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
             Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
             None => Err(missing_folder_error(&path.display().to_string())),
@@ -260,11 +267,12 @@ impl SourceName {
         )))
     }
 
-    /// Returns the folder of a recording, or the file of a photo.
-    pub fn path(&self) -> Option<&Path> {
+    /// Returns the folders that a recording is read from, or the file of a photo.
+    pub fn input_paths(&self) -> Vec<PathBuf> {
         match self {
-            SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
-            _ => None,
+            SourceName::Folder(path) => pictures::input_folders(path),
+            SourceName::Photo(path) => vec![path.clone()],
+            _ => Vec::new(),
         }
     }
 

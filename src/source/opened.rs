@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo};
 #[cfg(feature = "camera")]
-use super::{Frames, name};
+use super::name;
+use super::{DepthOrigin, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
@@ -71,8 +71,9 @@ impl Opened {
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &request.recording_options()?)?);
+                let recording = Arc::new(Recording::open(folder, &request.options.recording_options())?);
                 let name = folder.display().to_string();
+                warn_of_own_properties(&recording, frames);
                 let part = PlayRange {
                     start_s: frames.start.unwrap_or(0.0),
                     end_s: frames.end,
@@ -151,6 +152,16 @@ pub(super) fn recorded_depth_origin(recording: &Recording) -> DepthOrigin {
         true if recording.has_relative_depth() => DepthOrigin::Relative,
         true if recording.has_depth_in_units() => DepthOrigin::Units,
         true => DepthOrigin::Metres,
+    }
+}
+
+/// Warns of options that a recording has no use for.
+fn warn_of_own_properties(recording: &Recording, frames: &Frames) {
+    if let Some(fps) = frames.fps.filter(|_| recording.has_times()) {
+        tracing::warn!("without effect here: --fps {fps} (a recording has its own)");
+    }
+    if let Some(Size { width, height }) = frames.size.filter(|_| !recording.is_chosen_by_size()) {
+        tracing::warn!("without effect here: --size {width}x{height} (a recording has its own)");
     }
 }
 

@@ -52,13 +52,18 @@ pub struct Frames {
     /// Stop after this many frames
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..)))]
     pub frames: Option<u64>,
-    /// Picture size; for a camera, its nearest size [default: 1280x720 for a camera, 640x480 for `synthetic`; `demo`
-    /// has its own]
+    /// Picture size; for a camera, its nearest size; for single scenes of several sizes (KITTI), which of them [default:
+    /// 1280x720 for a camera, 640x480 for `synthetic`; `demo` has its own]
     #[cfg_attr(feature = "clap", arg(long, value_name = "WxH"))]
     pub size: Option<Size>,
-    /// Frames per second; for a camera, its nearest rate [default: 30]
+    /// Frames per second; for a camera, its nearest rate; for a recording, only if it has no times [default: 30]
     #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", value_parser = parse_rate))]
     pub fps: Option<f64>,
+    /// Read recordings whose links lead outside their folder
+    #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true))]
+    pub follow_links: bool,
     /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: the best for its connection]
     #[cfg(feature = "camera")]
     #[cfg_attr(feature = "clap", arg(long, value_name = "FOURCC"))]
@@ -74,7 +79,8 @@ pub struct Frames {
 #[cfg_attr(feature = "clap", derive(Args))]
 #[cfg_attr(feature = "clap", command(next_help_heading = "Depth"))]
 pub struct Depth {
-    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
+    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: the recording's, else 5000; 1000
+    /// from a camera]
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = parse_positive))]
     pub depth_scale: Option<f32>,
     /// Value of a depth picture that means unknown, besides 0
@@ -111,11 +117,6 @@ impl Depth {
             invalid: Some(f32::from(self.depth_invalid)),
             fit: self.depth_fit,
         }
-    }
-
-    /// Returns the units per metre in depth files.
-    pub fn file_scale(&self) -> f32 {
-        self.depth_scale.unwrap_or(DEPTH_SCALE)
     }
 
     /// Returns the units per metre of a depth camera.

@@ -1,13 +1,17 @@
 //! Recordings and single pictures: a written file is read back, and faults are reported.
 
+mod associations;
 mod depth_files;
 mod euroc;
 mod faults;
 mod kitti;
+mod kitti_scenes;
 mod layout;
 mod maps;
 mod middlebury;
+mod pictures;
 mod real;
+mod rgbd;
 mod still;
 mod writer;
 

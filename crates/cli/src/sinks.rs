@@ -1,5 +1,6 @@
 //! Conversion of `--to` options to one sink.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -23,8 +24,9 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
         DepthChoice::Folder(folder) => Some(folder.as_path()),
         _ => None,
     };
+    let inputs: Vec<PathBuf> = source.input_paths().into_iter().chain(depth_folder.map(Path::to_owned)).collect();
     for (index, target) in targets.iter().enumerate() {
-        for read in source.path().into_iter().chain(depth_folder) {
+        for read in &inputs {
             let path = target.path().filter(|_| !target.is_camera());
             path.map_or(Ok(()), |path| refuse_overwriting_source("--to", path, read))?;
         }

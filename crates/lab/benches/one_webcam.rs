@@ -125,7 +125,7 @@ fn measure_sources(options: &Options, data: &Path) -> Result<(), Box<dyn std::er
 /// Returns the pictures of the sequence in this size, and its background: for each pixel, the colour at its farthest
 /// depth.
 fn load_pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImage), Box<dyn std::error::Error>> {
-    let options = recording::Options { depth_scale: 1000.0, ..recording::Options::default() };
+    let options = recording::Options { depth_scale: Some(1000.0), ..recording::Options::default() };
     let recording = Recording::open(&data.join("rgbd/person_turning"), &options)?;
     let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
     let (mut plate, mut farthest_m, mut pictures) = (ColorImage::default(), Vec::new(), Vec::new());

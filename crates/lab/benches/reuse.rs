@@ -70,7 +70,7 @@ struct Finished {
 
 fn read_frames(options: &Options, look: &Look) -> Result<Vec<Finished>, Box<dyn std::error::Error>> {
     let default = Reading::default();
-    let reading = Reading { depth_scale: options.depth_scale.unwrap_or(default.depth_scale), ..default };
+    let reading = Reading { depth_scale: options.depth_scale, ..default };
     let recording = Recording::open(&options.recording, &reading)?;
     let mut scratch = Scratch::default();
     let mut calculator = None;

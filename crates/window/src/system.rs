@@ -153,7 +153,8 @@ impl System {
             match name {
                 // Checks the recording itself, because the opened source reveals only the method in use.
                 SourceName::Folder(folder) => {
-                    let recording = Recording::open(folder, &Reading { keep_going: true, ..Reading::default() }).ok();
+                    let recording =
+                        Recording::open(folder, &Reading { keep_going: true, ..self.options.recording_options() }).ok();
                     let has = |own: &mut Vec<DepthMethod>, is: bool, depth_method: DepthMethod| {
                         own.extend(is.then_some(depth_method))
                     };
@@ -276,7 +277,7 @@ impl Services for System {
         let source_name = SourceName::from_str(name).map_err(|error| error.with_prefix(name).to_string())?;
         match &source_name {
             SourceName::Folder(folder) => {
-                let reading = Reading { keep_going: true, ..Reading::default() };
+                let reading = Reading { keep_going: true, ..self.options.recording_options() };
                 Recording::open(folder, &reading).map(drop).map_err(|error| error.to_string())
             }
             _ => Ok(()),

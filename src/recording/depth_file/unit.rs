@@ -19,6 +19,13 @@ pub enum DepthUnit {
 /// Units per metre of millimetres.
 const MILLIMETRES: f32 = 1000.0;
 
+impl DepthUnit {
+    /// Returns the units per metre of distances, if they are stated.
+    pub fn units_per_m(self) -> Option<f32> {
+        if let Self::PerMetre(scale) = self { Some(scale) } else { None }
+    }
+}
+
 impl FromStr for DepthUnit {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {

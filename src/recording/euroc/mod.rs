@@ -4,9 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder, find_numbered_pictures};
+use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::error::RecordingError;
 use super::fault::LineFault;
+use super::folder::find_numbered_pictures;
 use super::list::{self, Entry, clear_unordered_times, parse_relative_path, quote, refuse_faults};
 use super::{Options, StereoGeometry, Unpaired, pair, timeline};
 use crate::calibration;
@@ -92,13 +93,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let entries = left.read(dir, options)?;
     if !right.exists_in(dir) {
         let frames = entries.into_iter().map(|left| frame(left, None)).collect();
-        return Ok(Contents {
-            frames,
-            depth: None,
-            stereo_geometry: None,
-            disparity_count: None,
-            unpaired: Unpaired::default(),
-        });
+        return Ok(Contents { frames, has_times: true, ..Contents::default() });
     }
     // A right picture more than half a period away belongs to another left one, which may be missing.
     let half_period_ns = timeline::median_period_ns(entries.iter().filter_map(|entry| entry.time_ns)) / 2;
@@ -114,10 +109,10 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     };
     Ok(Contents {
         frames: paired.frames.into_iter().map(|(left, right)| frame(left, right)).collect(),
-        depth: None,
         stereo_geometry: Some(stereo_geometry),
-        disparity_count: None,
         unpaired: Unpaired { color: paired.unpaired, right: paired.unpaired_others, ..Unpaired::default() },
+        has_times: true,
+        ..Contents::default()
     })
 }
 

@@ -1,14 +1,17 @@
 //! The layouts of the KITTI benchmarks, odometry (one sequence) and stereo, and their derivatives: a folder per camera,
-//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line.
+//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line; or single
+//! scenes, each with its calibration.
 
 pub(super) mod calib;
+mod scenes;
 mod times;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder, find_numbered_pictures};
+use super::contents::{Contents, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::error::RecordingError;
+use super::folder::find_numbered_pictures;
 use super::geometry::Geometry;
 use super::list::{clear_unordered_times, refuse_faults};
 use super::{Options, StereoGeometry, Unpaired};
@@ -71,6 +74,14 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         }
     }
 
+    let is_chosen_by_size = scenes::are_single(dir, &names);
+    let (names, scenes_rig) = match is_chosen_by_size {
+        true => {
+            let scenes = scenes::choose(folder, folders.left, folders.camera, names, options)?;
+            (scenes.names, scenes.rig)
+        }
+        false => (names, None),
+    };
     let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", folders.left))));
     let mut entries = times::timed_entries(dir, pictures.collect(), options)?;
     clear_unordered_times(entries.iter_mut());
@@ -85,18 +96,17 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         depth: None,
     });
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
-    let stereo_geometry = match calibration {
-        Some(path) => {
-            StereoGeometry::Rectified(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig)
-        }
-        None => StereoGeometry::Uncalibrated,
+    let rig = match calibration.filter(|_| scenes_rig.is_none()) {
+        Some(path) => Some(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig),
+        None => scenes_rig,
     };
     Ok(Contents {
         frames: frames.collect(),
-        depth: None,
-        stereo_geometry: Some(stereo_geometry),
-        disparity_count: None,
+        stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, StereoGeometry::Rectified)),
+        is_chosen_by_size,
         unpaired: Unpaired { right: right_alone.len(), ..Unpaired::default() },
+        has_times: dir.join(times::LIST).exists(),
+        ..Contents::default()
     })
 }
 

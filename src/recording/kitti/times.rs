@@ -7,8 +7,9 @@ use crate::recording::contents::PictureSource;
 use crate::recording::error::RecordingError;
 use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quote};
+use crate::recording::timeline::given_period_ns;
 
-const LIST: &str = "times.txt";
+pub(super) const LIST: &str = "times.txt";
 
 /// Period without a list of times: 10 frames per second, the trigger rate of KITTI's cameras.
 const PERIOD_NS: u64 = 100_000_000;
@@ -18,7 +19,7 @@ const LAST_S: f64 = 1e10;
 
 /// Returns entries with times for `pictures` (name, file). A picture named by the number n has the time in line n (from
 /// 0) of `times.txt`, so that an excerpt may keep the full list; other names count by position. Without the list, the
-/// pictures are [`PERIOD_NS`] apart.
+/// pictures are [`Options::period_ns`] apart, else [`PERIOD_NS`].
 ///
 /// # Errors
 /// A picture has no time, and `keep_going` is not set.
@@ -28,8 +29,9 @@ pub(super) fn timed_entries(
     options: &Options,
 ) -> Result<Vec<Entry>, RecordingError> {
     if !dir.join(LIST).exists() {
+        let period_ns = given_period_ns(options).unwrap_or(PERIOD_NS);
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
-            time_ns: Some(index * PERIOD_NS),
+            time_ns: Some(index * period_ns),
             source: PictureSource::from_path(file),
         };
         return Ok((0..).zip(pictures).map(entry).collect());
@@ -38,7 +40,7 @@ pub(super) fn timed_entries(
     let entries = pictures.into_iter().enumerate().map(|(index, (name, file))| {
         let number = name.split('.').next().and_then(|stem| stem.parse().ok()).unwrap_or(index);
         match times.get(number) {
-            Some((position, time_ns)) => Ok(Entry::new(*position, time_ns.clone(), Ok(file))),
+            Some((position, time_ns)) => Ok(Entry::new(position.clone(), time_ns.clone(), Ok(file))),
             None if options.keep_going => Ok(Entry { time_ns: None, source: PictureSource::from_path(file) }),
             None => Err(RecordingError::TooFewTimes {
                 list: dir.join(LIST),

@@ -9,13 +9,13 @@ use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource,
 use super::decode;
 use super::error::RecordingError;
 use super::geometry::Geometry;
-use super::{Options, StereoGeometry, Unpaired};
+use super::{Options, StereoGeometry};
 use crate::optics::StereoRig;
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "Middlebury stereo",
     expected_files: "im0.png and im1.png",
-    matches_folder: |dir| find_pair(dir).is_some(),
+    matches_folder: |dir| find_pair(dir).is_some() || find_half(dir).is_some(),
     open,
 };
 
@@ -32,9 +32,20 @@ fn find_pair(dir: &Path) -> Option<[PictureSource; 2]> {
     Some(pair.map(|picture| PictureSource::from_path(picture.into())))
 }
 
+/// Returns the missing and the existing picture of an incomplete pair with its calibration or disparities.
+fn find_half(dir: &Path) -> Option<[&'static str; 2]> {
+    let has = |name: &str| dir.join(name).exists();
+    let [left, right] = PICTURE_PAIRS[0];
+    let half = [[left, right], [right, left]].into_iter().find(|[missing, present]| !has(missing) && has(present));
+    half.filter(|_| has(CALIBRATION) || DISPARITIES.iter().any(|name| has(name)))
+}
+
 /// Creates a recording of one frame: the pair, with depth if there are a calibration and a disparity map.
 fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
+    if let Some([missing, present]) = find_half(dir).filter(|_| find_pair(dir).is_none()) {
+        return Err(RecordingError::MissingEye { dir: dir.clone(), missing, present });
+    }
     let [color, right] =
         find_pair(dir).unwrap_or(PICTURE_PAIRS[0].map(|picture| PictureSource::from_path(picture.into())));
     let file = dir.join(CALIBRATION);
@@ -50,7 +61,7 @@ fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents, RecordingErro
         depth: form,
         stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, |(rig, _)| StereoGeometry::Rectified(rig))),
         disparity_count: rig.and_then(|(_, count)| count),
-        unpaired: Unpaired::default(),
+        ..Contents::default()
     })
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::is_picture;
 use super::time::parse_ns;
 use crate::recording::contents::ListPosition;
 use crate::recording::error::RecordingError;
@@ -17,31 +18,46 @@ fn faulty_entry(position: ListPosition, fault: LineFault) -> Entry {
 }
 
 /// Reads lines of `time file`.
-pub(super) fn read_list(dir: &Path, list: &'static str) -> Result<Vec<Entry>, RecordingError> {
+pub(super) fn read_list(dir: &Path, list: &str) -> Result<Vec<Entry>, RecordingError> {
     let expected = "time file";
-    list::read_list(dir, list, |position, text| match text.map(split_columns) {
-        Ok((_, [Some(time), Some(file), None, ..])) => parse_entry(position, time, file),
+    list::read_list(dir, list, |position, text| match text.map(split_columns::<3>) {
+        Ok((_, [Some(time), Some(file), None])) => parse_entry(position, time, file),
         Ok((found, _)) => faulty_entry(position, LineFault::Columns { expected, found }),
         Err(fault) => faulty_entry(position, fault),
     })
 }
 
-/// Reads lines of `time file time file`. A faulty line makes two faulty entries.
-pub(super) fn read_pairs(dir: &Path, list: &'static str) -> Result<Vec<[Entry; 2]>, RecordingError> {
+/// Reads lines of `time file time file`, with or without a pose. A faulty line makes two faulty entries.
+pub(super) fn read_pairs(dir: &Path, list: &str) -> Result<Vec<[Entry; 2]>, RecordingError> {
     let expected = "time file time file";
-    let both_faulty =
-        |position, fault: LineFault| [faulty_entry(position, fault.clone()), faulty_entry(position, fault)];
-    list::read_list(dir, list, |position, text| match text.map(split_columns) {
-        Ok((_, [Some(time), Some(file), Some(other_time), Some(other_file), None])) => {
-            [parse_entry(position, time, file), parse_entry(position, other_time, other_file)]
+    let both_faulty = |position: ListPosition, fault: LineFault| {
+        [faulty_entry(position.clone(), fault.clone()), faulty_entry(position, fault)]
+    };
+    list::read_list(dir, list, |position, text| match text.map(split_pair) {
+        Ok(Ok([time, file, other_time, other_file])) => {
+            [parse_entry(position.clone(), time, file), parse_entry(position, other_time, other_file)]
         }
-        Ok((found, _)) => both_faulty(position, LineFault::Columns { expected, found }),
+        Ok(Err(found)) => both_faulty(position, LineFault::Columns { expected, found }),
         Err(fault) => both_faulty(position, fault),
     })
 }
 
-/// Returns the number of columns, and the first five.
-fn split_columns(text: &str) -> (usize, [Option<&str>; 5]) {
+/// Returns the four columns of a pair: all of them, or of twelve the first or last four, whichever name pictures; the
+/// others are a time and a pose. Otherwise returns the number of columns.
+pub(super) fn split_pair(text: &str) -> Result<[&str; 4], usize> {
+    let columns = split_columns::<13>(text);
+    let pair_from = |first: usize| Some([0, 1, 2, 3].map(|column| columns.1[first + column].unwrap_or_default()));
+    let names_pictures = |pair: &[&str; 4]| [pair[1], pair[3]].iter().all(|file| is_picture(Path::new(file)));
+    let pair = match columns.0 {
+        4 => pair_from(0),
+        12 => [0, 8].into_iter().filter_map(pair_from).find(names_pictures),
+        _ => None,
+    };
+    pair.ok_or(columns.0)
+}
+
+/// Returns the number of columns, and the first `N`.
+fn split_columns<const N: usize>(text: &str) -> (usize, [Option<&str>; N]) {
     let mut columns = text.split_ascii_whitespace();
     (columns.clone().count(), std::array::from_fn(|_| columns.next()))
 }

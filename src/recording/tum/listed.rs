@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
+use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, is_picture, list};
 use crate::recording::list::Entry;
 
 const LISTS: [&str; 3] = [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS];
@@ -28,11 +28,6 @@ pub(super) fn find_pictures(dir: &Path) -> impl Iterator<Item = String> {
     let named = LISTS.into_iter().flat_map(entries).filter_map(|entry| entry.source.file.ok());
     let named = named.filter(|file| is_picture(file) && file.components().count() <= 2 && is_file(&dir.join(file)));
     named.filter_map(|file| Some(file.components().as_path().to_str()?.to_owned())).collect::<Vec<_>>().into_iter()
-}
-
-fn is_picture(file: &Path) -> bool {
-    let is = |known: &str| file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
-    ["png", "jpg", "jpeg"].into_iter().any(is)
 }
 
 /// Returns whether the path is a regular file, not a link to one.

@@ -3,7 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
+use super::associations::find_associations;
+use super::{COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::contents::{Contents, DepthFormat, ListedFrame, Locator, PictureSource, RecordingFolder};
 use crate::recording::decode::{self, PictureKind};
 use crate::recording::error::RecordingError;
@@ -15,17 +16,20 @@ const MAX_PICTURES: usize = 1000;
 
 /// Returns whether `dir` has a list of this layout.
 pub(super) fn is_tum_folder(dir: &Path) -> bool {
-    [ASSOCIATIONS, COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists())
+    [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists()) || !find_associations(dir).is_empty()
 }
 
 /// Reads the lists in `folder`.
 pub(super) fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let has = |list: &str| dir.join(list).exists();
-    match (has(ASSOCIATIONS), has(COLOR_LIST), has(DEPTH_LIST)) {
-        (true, ..) => from_associations(folder, options),
-        (false, true, has_depth) => from_lists(dir, has_depth, options),
-        (false, false, _) => {
+    match (&find_associations(dir)[..], has(COLOR_LIST), has(DEPTH_LIST)) {
+        ([list], ..) => from_associations(folder, list, options),
+        ([one, other, ..], ..) => {
+            Err(RecordingError::TwoLists { dir: dir.clone(), lists: [one.clone(), other.clone()] })
+        }
+        ([], true, has_depth) => from_lists(dir, has_depth, options),
+        ([], false, _) => {
             Err(RecordingError::MissingList { dir: dir.clone(), missing: COLOR_LIST, present: DEPTH_LIST })
         }
     }
@@ -61,14 +65,14 @@ fn to_frame(color: Entry, depth: Option<PictureSource>) -> ListedFrame {
 
 /// `depth_options` must be given if the frames have depth.
 fn to_contents(frames: Vec<ListedFrame>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
-    let depth = depth_options.map(DepthFormat::of_pictures);
-    Contents { frames, depth, stereo_geometry: None, disparity_count: None, unpaired }
+    let depth = depth_options.map(|options| DepthFormat::of_pictures(options, super::DEPTH_SCALE));
+    Contents { frames, depth, unpaired, has_times: true, ..Contents::default() }
 }
 
-/// Takes the pairs of `associations.txt` as they are; the colour picture determines the time of a frame.
-fn from_associations(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
-    let mut pairs = list::read_pairs(&folder.dir, ASSOCIATIONS)?;
-    if !is_color_first(folder, &pairs)? {
+/// Takes the pairs of the list of associations as they are; the colour picture determines the time of a frame.
+fn from_associations(folder: &RecordingFolder, list: &str, options: &Options) -> Result<Contents, RecordingError> {
+    let mut pairs = list::read_pairs(&folder.dir, list)?;
+    if !is_color_first(folder, list, &pairs)? {
         pairs.iter_mut().for_each(|pair| pair.reverse());
     }
     clear_unordered_times(pairs.iter_mut().map(|[color, _]| color));
@@ -81,7 +85,7 @@ fn from_associations(folder: &RecordingFolder, options: &Options) -> Result<Cont
 
 /// Returns whether colour is in the first two columns and depth in the last two, decided by a file that another list
 /// names, or else by a pair of pictures of different kinds.
-fn is_color_first(folder: &RecordingFolder, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
+fn is_color_first(folder: &RecordingFolder, associations: &str, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
     for (list, is_color) in [(COLOR_LIST, true), (DEPTH_LIST, false)] {
         // The other lists are only a hint here: ignore their faults.
         let Ok(entries) = list::read_list(&folder.dir, list) else { continue };
@@ -111,7 +115,7 @@ fn is_color_first(folder: &RecordingFolder, pairs: &[[Entry; 2]]) -> Result<bool
     }
     // Broken lines are a better explanation than unreadable columns.
     refuse_faults(&folder.dir, pairs.iter().flatten())?;
-    Err(RecordingError::Columns { list: folder.dir.join(ASSOCIATIONS) })
+    Err(RecordingError::Columns { list: folder.dir.join(associations) })
 }
 
 /// Returns the kind of a picture, if readable. Each file is read once and cached in `kinds`.

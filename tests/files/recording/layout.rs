@@ -134,14 +134,17 @@ fn the_period_is_the_median_or_that_of_30_frames_per_second() {
 #[test]
 fn depth_follows_the_scale_and_the_value_for_unknown() {
     let scene = Scene::with_pairs(1);
-    let options = Options { depth_scale: 1000.0, ..Options::default() };
+    let options = Options { depth_scale: Some(1000.0), ..Options::default() };
     let read = |options: &Options| depth_of(&scene.open_with(options).unwrap(), 0).unwrap().metres;
     assert!(read(&options).iter().all(|&metres| metres == 5.0));
     assert!(read(&Options { depth_invalid: Some(5000), ..options }).iter().all(|&metres| metres == 0.0));
     scene.depth("depth/0.png", SIZE, 0);
     assert!(read(&options).iter().all(|&metres| metres == 0.0));
     for depth_scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert_says(scene.open_with(&Options { depth_scale, ..options }), &["depth scale", "units per metre"]);
+        assert_says(
+            scene.open_with(&Options { depth_scale: Some(depth_scale), ..options }),
+            &["depth scale", "units per metre"],
+        );
     }
 }
 

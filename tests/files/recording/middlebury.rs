@@ -98,13 +98,31 @@ fn what_is_wrong_is_told() {
     assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the file ends before"]);
 }
 
-/// A single picture of a pair is not a recording.
+#[test]
+fn half_a_pair_is_told() {
+    for (missing, present) in [("im1.png", "im0.png"), ("im0.png", "im1.png")] {
+        for remaining in ["calib.txt", "disp0.pfm"] {
+            let scene = with_pair();
+            ["calib.txt", "disp0.pfm"].iter().filter(|name| **name != remaining).for_each(|name| scene.remove(name));
+            scene.remove(missing);
+            assert_says(scene.open(), &[&format!("{missing} is missing beside {present}")]);
+        }
+    }
+}
+
 #[test]
 fn a_folder_that_is_nothing_is_told_all_layouts() {
-    let scene = with_pair();
-    scene.remove("im1.png");
+    let scene = Scene::new();
     let opened = Recording::open(&scene.path(""), &Options::default());
-    let layouts =
-        ["rgb.txt (TUM RGB-D)", "mav0/cam0", "(EuRoC/ASL)", "image_2 and image_3", "(KITTI)", "im0.png and im1.png"];
+    let layouts = [
+        "rgb.txt (TUM RGB-D)",
+        "mav0/cam0",
+        "(EuRoC/ASL)",
+        "image_2 and image_3",
+        "(KITTI)",
+        "im0.png and im1.png",
+        "color and depth",
+        "PNG or JPEG",
+    ];
     assert_says(opened, &[&["not a recording", "give the folder"], &layouts[..]].concat());
 }

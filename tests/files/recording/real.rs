@@ -11,7 +11,7 @@ use super::{color_of, depth_of, right_of};
 #[ignore = "needs BOKEHCAM_DATA, a folder with rgbd/person_turning"]
 fn a_person_turning_before_a_wall() {
     let data = std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data");
-    let options = Options { depth_scale: 1000.0, ..Options::default() };
+    let options = Options { depth_scale: Some(1000.0), ..Options::default() };
     let recording = Recording::open(&Path::new(&data).join("rgbd/person_turning"), &options).unwrap();
     assert_eq!((recording.len(), recording.size(), recording.has_depth()), (40, (640, 480), true));
     assert!((33_333_000..=33_334_000).contains(&recording.period_ns()), "{} ns", recording.period_ns());

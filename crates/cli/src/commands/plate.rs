@@ -51,8 +51,8 @@ pub struct PlateCommand {
 pub fn run(command: &PlateCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     let PlateCommand { source: name, to, frames, output } = command;
     refuse_overwrite([to.as_path()], output.force)?;
-    if let Some(folder) = name.path() {
-        refuse_overwriting_source("--to", to, folder)?;
+    for folder in name.input_paths() {
+        refuse_overwriting_source("--to", to, &folder)?;
     }
     still::photo_format(to)?;
     let options = Options { frames: frames.clone(), depth_choice: DepthChoice::None, ..Options::default() };

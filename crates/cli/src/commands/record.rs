@@ -65,8 +65,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
             command.source
         )));
     }
-    if let Some(folder) = command.source.path() {
-        refuse_overwriting_source("--to", &command.to, folder)?;
+    for folder in command.source.input_paths() {
+        refuse_overwriting_source("--to", &command.to, &folder)?;
     }
     let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &options, None)?;
     unused::warn_of_unused(

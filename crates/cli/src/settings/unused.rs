@@ -67,7 +67,6 @@ type Requirement = (&'static [&'static str], Reason);
 /// Conditions that depend on the source alone.
 const NEEDS_OF_SOURCE: &[Requirement] = &[
     (&["size", "fps"], |run| match run.source {
-        FrameOrigin::Source(Kind::Recording) => Some("a recording has its own"),
         FrameOrigin::Source(Kind::Demo) => Some("the demonstration has its own"),
         FrameOrigin::Source(Kind::Photo) => Some("a photo has its own size and only one frame"),
         _ => None,
@@ -304,8 +303,8 @@ mod tests {
         assert!(why("tilt", &dof).is_some() && why("tilt", &RunFacts { effect: Effect::TiltShift, ..RUN }).is_none());
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &RunFacts { realtime: true, ..dof }).is_none());
         assert!(why("rim", &RunFacts { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
-        for kind in [Kind::Recording, Kind::Demo] {
-            assert!(why("fps", &RunFacts { source: FrameOrigin::Source(kind), ..dof }).is_some());
+        for (kind, is_unused) in [(Kind::Recording, false), (Kind::Demo, true), (Kind::Photo, true)] {
+            assert_eq!(why("fps", &RunFacts { source: FrameOrigin::Source(kind), ..dof }).is_some(), is_unused);
         }
     }
 }

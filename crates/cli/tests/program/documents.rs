@@ -38,7 +38,7 @@ const LEFT_OUT: [(&str, &str); 19] = [
 ];
 
 /// Commands of this program whose arguments are only checked: a part of the command, and the reason.
-const ONLY_CHECKED: [(&str, &str); 11] = [
+const ONLY_CHECKED: [(&str, &str); 12] = [
     ("bokehcam models add", "needs a file from elsewhere"),
     ("bokehcam models get", "needs a network"),
     ("bokehcam plate", "needs a camera"),
@@ -50,6 +50,7 @@ const ONLY_CHECKED: [(&str, &str); 11] = [
     ("bokehcam devices", "says what this machine has"),
     ("bokehcam doctor", "judges this machine"),
     ("bokehcam bench", "measures this machine, for minutes"),
+    ("somewhere/", "needs a data set"),
 ];
 
 /// A missing settings file: the program parses all other arguments before it refuses this one.

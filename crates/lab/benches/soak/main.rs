@@ -165,7 +165,7 @@ type Deliveries = Vec<(u64, u64)>;
 /// Plays frames of the recording in real time.
 fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dyn Error>> {
     let name = options.folder.display().to_string();
-    let reading = Reading { depth_scale: options.depth_scale, ..Reading::default() };
+    let reading = Reading { depth_scale: Some(options.depth_scale), ..Reading::default() };
     let recording = Arc::new(Recording::open(&options.folder, &reading)?);
     let size = recording.size();
     let height = size.1 as f32;

@@ -41,7 +41,7 @@ pub struct Sequence(Recording);
 
 impl Sequence {
     pub fn open() -> Self {
-        let options = Options { depth_scale: 1000.0, ..Options::default() };
+        let options = Options { depth_scale: Some(1000.0), ..Options::default() };
         Self(Recording::open(&data().join("rgbd/person_turning"), &options).unwrap())
     }
 

@@ -1,0 +1,126 @@
+//! A folder of pictures without lists, in natural order of their names, or those of a pattern such as
+//! `DIR/IMG_%04d.jpg`. Depth maps may be beside them: named `NAME-depth` or `NAME.depth`, in a folder `depth` or
+//! `depths` within or beside the folder, or in `DIR-depth`.
+
+mod pattern;
+
+use std::path::{Path, PathBuf};
+
+use super::contents::{Contents, Layout, ListedFrame, Locator, PictureSource, RecordingFolder};
+use super::error::RecordingError;
+use super::fault::PictureFault;
+use super::folder::{Pictures, find_pictures, has_pictures};
+use super::rgbd::{self, Scale};
+use super::{Options, decode, timeline};
+use pattern::Pattern;
+
+/// Any folder with pictures: the last layout to try.
+pub(super) const LAYOUT: Layout = Layout {
+    name: "pictures",
+    expected_files: "PNG or JPEG files",
+    matches_folder: |dir| has_pictures(dir, |stem| !is_map(stem)),
+    open: |folder, options| from_names(folder, find_pictures(&folder.dir, |stem| !is_map(stem))?, options),
+};
+
+/// Suffixes of depth maps in the folder of the pictures.
+const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
+
+fn is_map(stem: &str) -> bool {
+    MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
+}
+
+/// Returns the folder of a pattern's pictures, such as `DIR` of `DIR/IMG_%04d.jpg`; `None` if the path is not a
+/// pattern, or exists.
+pub fn pattern_folder(path: &Path) -> Option<&Path> {
+    pattern::split_pattern(path).map(|(folder, _)| folder)
+}
+
+/// Returns the folders that a recording opened by this name reads.
+pub fn input_folders(path: &Path) -> Vec<PathBuf> {
+    let folder = pattern_folder(path).unwrap_or(path);
+    [Some(folder.to_owned()), find_maps(folder).map(|(maps, _)| maps)].into_iter().flatten().collect()
+}
+
+/// Reads the pictures of the pattern `path`, in the order of their numbers.
+///
+/// # Errors
+/// The folder cannot be listed, or has no such picture.
+pub(super) fn open_pattern(
+    folder: &RecordingFolder,
+    path: &Path,
+    options: &Options,
+) -> Result<Contents, RecordingError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let number = |file: &str| Pattern::parse(&name)?.number(file);
+    let mut names = find_pictures(&folder.dir, |_| true)?;
+    names.retain(|file| number(file).is_some());
+    names.sort_by_cached_key(|file| number(file));
+    if names.is_empty() {
+        return Err(RecordingError::NoMatch { folder: folder.dir.clone(), pattern: name.into_owned() });
+    }
+    from_names(folder, names, options)
+}
+
+/// Creates the contents from pictures in this order, with their depth maps if there are any.
+fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -> Result<Contents, RecordingError> {
+    let dir = &folder.dir;
+    if !options.keep_going {
+        refuse_other_sizes(folder, &names)?;
+    }
+    let pictures = Pictures::all_in(Path::new(""));
+    if let Some((maps_dir, suffix)) = find_maps(dir) {
+        let maps = Pictures { suffix, ..pictures };
+        let maps_root = maps_dir.canonicalize().map_err(RecordingError::io("open the depth maps", &maps_dir))?;
+        let maps_dir = if maps_dir == *dir { dir } else { &maps_root };
+        return match rgbd::from_pairs(dir, (pictures, names.clone()), (maps_dir, maps), Scale::Millimetres, options) {
+            Err(error @ RecordingError::NoNumberPairs { .. }) => {
+                tracing::warn!("{error}; the pictures are used without depth");
+                Ok(without_depth(dir, names, options))
+            }
+            contents => Ok(Contents { maps_root: Some(maps_root), ..contents? }),
+        };
+    }
+    Ok(without_depth(dir, names, options))
+}
+
+fn without_depth(dir: &Path, names: Vec<String>, options: &Options) -> Contents {
+    let rate = timeline::describe_rate(options);
+    tracing::warn!("{}: {} pictures without lists, in the order of their names, {rate}", dir.display(), names.len());
+    let frames = (0..).zip(names).map(|(index, name)| ListedFrame {
+        time_ns: Some(timeline::numbered_time_ns(index, options)),
+        color: PictureSource::from_path(name.into()),
+        right: None,
+        depth: None,
+    });
+    Contents { frames: frames.collect(), ..Contents::default() }
+}
+
+/// Returns the folder of the depth maps for the pictures in `dir`, and the suffix of their stems.
+fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
+    if let Some(suffix) = MAP_SUFFIXES.into_iter().find(|suffix| has_pictures(dir, |stem| stem.ends_with(suffix))) {
+        return Some((dir.to_owned(), suffix));
+    }
+    let absolute = std::path::absolute(dir).ok()?;
+    let (name, parent) = (absolute.file_name()?.to_str()?, absolute.parent()?);
+    // A folder of any other name is no part of a recording with the folder beside it.
+    let is_part = rgbd::COLOR_FOLDERS.contains(&name);
+    let within = rgbd::DEPTH_FOLDERS.map(|folder| dir.join(folder));
+    let beside = rgbd::DEPTH_FOLDERS.into_iter().filter(|_| is_part).map(|folder| parent.join(folder));
+    let named = [format!("{name}-depth"), format!("{name}_depth")].map(|folder| parent.join(folder));
+    let mut folders = within.into_iter().chain(beside).chain(named);
+    folders.find(|folder| has_pictures(folder, |_| true)).map(|folder| (folder, ""))
+}
+
+/// Refuses pictures of another size than the first. A picture without a readable header is reported when it is read.
+fn refuse_other_sizes(folder: &RecordingFolder, names: &[String]) -> Result<(), RecordingError> {
+    let (mut expected, mut locator) = (None, Locator::new(folder));
+    for name in names {
+        let source = PictureSource::from_path(name.into());
+        let Ok((found, _)) = decode::read_header(&locator.locate(&source)?) else { continue };
+        let expected = *expected.get_or_insert(found);
+        if found != expected {
+            return Err(source.error(&folder.dir, PictureFault::Size { found, expected }));
+        }
+    }
+    Ok(())
+}

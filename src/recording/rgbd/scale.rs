@@ -1,0 +1,115 @@
+//! Units of depth maps, from the files of the data sets.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use crate::files::input;
+use crate::recording::error::RecordingError;
+
+/// Units per metre of Replica, as NICE-SLAM and iMAP render it: 65535 is 10 m.
+const REPLICA_SCALE: f32 = 6553.5;
+
+/// Maximum size of a file with scales: ten thousand pictures.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// The origin of the units.
+#[derive(Debug)]
+pub(in crate::recording) enum Scale {
+    /// Millimetres, as from nearly all depth cameras; 65535 is unknown.
+    Millimetres,
+    /// Replica's `cam_params.json`, if it exists: `camera.scale` units per metre.
+    Replica(Option<PathBuf>),
+    /// BOP's `scene_camera.json`: millimetres per unit as `depth_scale` of each picture.
+    Bop(PathBuf),
+}
+
+/// Units as stated by a data set.
+pub(super) struct StatedUnits {
+    pub(super) per_m: f32,
+    pub(super) invalid: Option<u16>,
+    /// What states them, for messages.
+    pub(super) origin: String,
+}
+
+#[derive(Deserialize)]
+struct CamParams {
+    camera: ReplicaCamera,
+}
+
+#[derive(Deserialize)]
+struct ReplicaCamera {
+    scale: f64,
+}
+
+#[derive(Deserialize)]
+struct BopCamera {
+    depth_scale: f64,
+}
+
+impl Scale {
+    /// Returns the origin of the units in the recording `dir`, whose colour pictures are in `color`.
+    pub(super) fn of_folder(dir: &Path, color: &Path) -> Self {
+        let file = |dir: &Path, name: &str| Some(dir.join(name)).filter(|file| file.is_file());
+        if let Some(file) = file(dir, "scene_camera.json") {
+            return Self::Bop(file);
+        }
+        // One file for all scenes, beside them.
+        let beside = std::path::absolute(dir).ok().and_then(|dir| Some(dir.parent()?.to_owned()));
+        let params = file(dir, "cam_params.json").or_else(|| file(&beside?, "cam_params.json"));
+        match color == Path::new("results") || params.is_some() {
+            true => Self::Replica(params),
+            false => Self::Millimetres,
+        }
+    }
+
+    /// Reads the file, if there is one.
+    ///
+    /// # Errors
+    /// It is unreadable, or states no scale > 0; or that of its pictures differs.
+    pub(super) fn read(&self) -> Result<StatedUnits, RecordingError> {
+        match self {
+            Self::Millimetres => {
+                let origin = "assumed to be millimetres, 65535 unknown".to_owned();
+                Ok(StatedUnits { per_m: 1000.0, invalid: Some(u16::MAX), origin })
+            }
+            Self::Replica(None) => {
+                let origin = "assumed to be Replica, without cam_params.json".to_owned();
+                Ok(StatedUnits { per_m: REPLICA_SCALE, invalid: None, origin })
+            }
+            Self::Replica(Some(file)) => to_units(file, read_json::<CamParams>(file)?.camera.scale),
+            Self::Bop(file) => {
+                let cameras: BTreeMap<String, BopCamera> = read_json(file)?;
+                let fault = |what: String| RecordingError::StatedScale { file: file.clone(), what };
+                let mut scales = cameras.iter().map(|(picture, camera)| (picture, camera.depth_scale));
+                let (first, scale) = scales.next().ok_or_else(|| fault("names no picture".to_owned()))?;
+                match scales.find(|(_, other)| *other != scale) {
+                    Some((other, differs)) => Err(fault(format!(
+                        "depth_scale is {scale} for picture {first}, but {differs} for {other}, and all need one"
+                    ))),
+                    None => to_units(file, 1000.0 / scale),
+                }
+            }
+        }
+    }
+}
+
+fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, RecordingError> {
+    let text = input::read_text(file, MAX_BYTES).map_err(RecordingError::io("read the depth scale", file))?;
+    serde_json::from_str(&text)
+        .map_err(|error| RecordingError::StatedScale { file: file.to_owned(), what: error.to_string() })
+}
+
+fn to_units(file: &Path, per_m: f64) -> Result<StatedUnits, RecordingError> {
+    let usable = Some(per_m as f32).filter(|per_m| *per_m > 0.0 && per_m.is_finite());
+    let name = file.file_name().unwrap_or_default().display().to_string();
+    match usable {
+        Some(per_m) => Ok(StatedUnits { per_m, invalid: None, origin: format!("from {name}") }),
+        None => {
+            let what = format!("states {per_m} units per metre, which is not a scale > 0");
+            Err(RecordingError::StatedScale { file: file.to_owned(), what })
+        }
+    }
+}

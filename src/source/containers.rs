@@ -1,0 +1,99 @@
+//! Recordings in a single file, which other programs turn into folders that can be read.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// The part of a Matroska file in which Azure Kinect's tags are, in bytes.
+const KINECT_HEAD: u64 = 1 << 20;
+
+/// Returns whether a file is such a recording: by its extension, and a `.mkv` by Azure Kinect's tags.
+pub(super) fn is_container(path: &Path) -> bool {
+    match extension(path).as_str() {
+        "bag" | "db3" | "mcap" | "svo" | "svo2" | "r3d" => true,
+        "mkv" => is_from_kinect(path),
+        _ => false,
+    }
+}
+
+/// Describes in one line how the recording becomes a folder with `color` and `depth`.
+pub(super) fn describe_conversion(path: &Path) -> String {
+    let folder = path.with_extension("");
+    let (file, dir) = (path.display(), folder.display());
+    match extension(path).as_str() {
+        "bag" => format!(
+            "a ROS bag must become a folder of pictures first; RealSense's does with Open3D (pip install open3d): \
+             python3 -c \"import open3d; open3d.t.io.RSBagReader.create('{file}').save_frames('{dir}')\" writes \
+             {dir}/color and {dir}/depth; others: rosbags-convert --src '{file}' --dst '{dir}-mcap' --dst-storage \
+             mcap, then as for .mcap"
+        ),
+        "db3" | "mcap" => format!(
+            "a ROS 2 recording must become a folder of pictures first: write its colour topic to \
+             {dir}/color/000000.png and so on, and its depth topic to {dir}/depth/000000.png (16-bit grey, \
+             millimetres), for example with the Python package rosbags; {dir} is then the source"
+        ),
+        "svo" | "svo2" => format!(
+            "a ZED recording must become a folder of pictures first: mkdir '{dir}' && ZED_SVO_Export '{file}' '{dir}' \
+             4 (of the ZED SDK's samples) writes {dir}/left000000.png and {dir}/depth000000.png; {dir} is then the \
+             source"
+        ),
+        "r3d" => format!(
+            "a Record3D recording must become a folder of pictures first: unzip '{file}' -d '{dir}', then write each \
+             {dir}/rgbd/N.depth (LZFSE of 32-bit metres; Python package pyliblzfse) to {dir}/depth/N.png (16-bit \
+             grey, millimetres) and move {dir}/rgbd/N.jpg to {dir}/color; {dir} is then the source"
+        ),
+        _ => format!(
+            "a recording of Azure Kinect must become a folder of pictures first: k4a_mkv2image -i='{file}' -s=false \
+             -t=true writes {dir}/color and {dir}/depth, aligned; {dir} is then the source"
+        ),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase()
+}
+
+/// Returns whether a Matroska file has tags of Azure Kinect, such as `K4A_DEPTH_MODE`.
+fn is_from_kinect(path: &Path) -> bool {
+    const TAG: &[u8] = b"K4A_";
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(KINECT_HEAD).read_to_end(&mut head));
+    read.is_ok() && head.windows(TAG.len()).any(|bytes| bytes == TAG)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::source::SourceName;
+
+    #[test]
+    fn each_kind_of_file_is_told_its_converter() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, content, converter) in [
+            ("take.bag", "#ROSBAG V2.0", "RSBagReader"),
+            ("TAKE.BAG", "", "rosbags-convert"),
+            ("take.db3", "SQLite format 3", "rosbags"),
+            ("take.mcap", "\u{89}MCAP0", "rosbags"),
+            ("take.svo", "", "ZED_SVO_Export"),
+            ("take.svo2", "", "ZED_SVO_Export"),
+            ("take.r3d", "PK", "unzip"),
+            ("take.mkv", "...K4A_COLOR_MODE...", "k4a_mkv2image"),
+        ] {
+            let path = dir.path().join(name);
+            fs::write(&path, content).unwrap();
+            let error = SourceName::parse_os(path.as_os_str()).unwrap_err();
+            assert!(error.is_wrong_argument());
+            let message = error.to_string();
+            assert!(!message.contains('\n') && message.contains(converter), "{message}");
+            assert!(message.contains(&path.with_extension("").display().to_string()), "{message}");
+        }
+        // Other videos are none of these, nor is what only looks like one by its name.
+        fs::write(dir.path().join("film.mkv"), "matroska").unwrap();
+        assert!(!is_container(&dir.path().join("film.mkv")));
+        fs::create_dir(dir.path().join("folder.bag")).unwrap();
+        assert!(SourceName::parse_os(dir.path().join("folder.bag").as_os_str()).is_ok());
+    }
+}
