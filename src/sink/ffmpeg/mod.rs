@@ -2,7 +2,6 @@
 
 mod command;
 mod container;
-mod process;
 mod raw;
 
 use std::io::{self, ErrorKind};
@@ -16,13 +15,13 @@ use std::time::Duration;
 
 use self::command::Format;
 use self::container::Container;
-use self::process::{Process, ProcessEnd};
 use self::raw::RawVideo;
 use super::output::OutputFile;
 use super::pipe::Pipe;
 use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::files::atomic_file::PartFile;
 use crate::frame::ColorImage;
+use crate::video::process::{Process, ProcessEnd};
 
 /// Longest wait for an encoder to start reading; frames are sent to it in any case.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(2);
