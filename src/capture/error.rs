@@ -7,6 +7,7 @@ use crate::pipewire::PipeWireError;
 use crate::recording::RecordingError;
 #[cfg(feature = "camera")]
 use crate::v4l2::live::OpenError;
+use crate::video::VideoError;
 
 /// Why a source delivers no frame.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -15,6 +16,9 @@ pub enum CaptureError {
     /// The recording's picture cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The video file cannot be read.
+    #[error(transparent)]
+    Video(#[from] VideoError),
     /// No frame lies between start and end.
     #[error(
         "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",

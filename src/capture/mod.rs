@@ -13,6 +13,7 @@ pub mod stereo_pair;
 pub mod synthetic;
 #[cfg(feature = "camera")]
 pub mod v4l2;
+pub mod video;
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion};
+use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion, video};
 use crate::capture::demo;
 
 /// The name of the synthetic scene.
@@ -26,6 +26,8 @@ pub enum Kind {
     Demo,
     /// A photo: a single frame.
     Photo,
+    /// A video file.
+    Video,
     /// The synthetic scene.
     Synthetic,
 }
@@ -50,6 +52,8 @@ pub enum SourceName {
     Folder(PathBuf),
     /// A PNG or JPEG.
     Photo(PathBuf),
+    /// A video file.
+    Video(PathBuf),
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(NamedCamera),
@@ -73,19 +77,13 @@ fn is_path(text: &str) -> bool {
     text.contains('/') && !text.starts_with("/dev/")
 }
 
-/// Returns whether a file is a video, by its extension.
-fn is_video(path: &Path) -> bool {
-    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
-    ["mp4", "mkv", "webm", "mov", "avi", "m4v", "y4m"].contains(&ending.as_str())
-}
-
 /// Writes the name so that it parses again.
 impl fmt::Display for SourceName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             SourceName::Synthetic => f.write_str(SYNTHETIC),
             SourceName::Demo => f.write_str(demo::NAME),
-            SourceName::Folder(path) | SourceName::Photo(path) => path.display().fmt(f),
+            SourceName::Folder(path) | SourceName::Photo(path) | SourceName::Video(path) => path.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
@@ -100,10 +98,10 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic"
         }
-        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
-        false => "a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
+        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic",
+        false => "a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic",
     }
 }
 
@@ -196,13 +194,9 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
-            Some(text) if path.is_file() && is_video(path) => SourceError::usage_error(format!(
-                "a video must be split into pictures first; ffmpeg makes a folder of them, which is then the source: \
-                 mkdir -p clip/rgb && ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk \
-                 '{{print NR/25, $0}}' > rgb.txt)"
-            )),
+            _ if let Some(video) = video::parse(path) => video,
             _ if path.is_file() => {
-                SourceError::usage_error(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
+                SourceError::usage_error(format!("it is neither a folder, a photo nor a video: use {}", accepted_sources()))
             }
             Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
@@ -226,6 +220,7 @@ impl SourceName {
             SourceName::Demo => Kind::Demo,
             SourceName::Folder(_) => Kind::Recording,
             SourceName::Photo(_) => Kind::Photo,
+            SourceName::Video(_) => Kind::Video,
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Kind::Camera,
             #[cfg(feature = "camera")]
@@ -239,10 +234,10 @@ impl SourceName {
     /// Such an option is given, and this is not a recording.
     pub fn check_frames(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
-            SourceName::Folder(_) => return Ok(()),
+            SourceName::Folder(_) | SourceName::Video(_) => return Ok(()),
             SourceName::Photo(_) if frames.start.is_none() && frames.end.is_none() => return Ok(()),
             SourceName::Photo(_) => {
-                let what = "--start and --end are for recordings: a photo is one frame; --loop --frames N repeats it";
+                let what = "--start and --end are for recordings and videos: a photo is one frame; --loop --frames N repeats it";
                 return Err(SourceError::Usage(what.to_owned()));
             }
             SourceName::Synthetic => SYNTHETIC,
@@ -256,14 +251,14 @@ impl SourceName {
             return Ok(());
         }
         Err(SourceError::Usage(format!(
-            "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
+            "--start, --end and --loop are for recordings and videos: {what} never ends, give it --frames"
         )))
     }
 
-    /// Returns the folder of a recording, or the file of a photo.
+    /// Returns the folder of a recording, or the file of a photo or video.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
+            SourceName::Folder(path) | SourceName::Photo(path) | SourceName::Video(path) => Some(path),
             _ => None,
         }
     }
@@ -285,7 +280,9 @@ impl SourceName {
     /// Returns the device nodes of its cameras.
     pub fn device_nodes(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),
+            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) | SourceName::Video(_) => {
+                Vec::new()
+            },
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Vec::new(),
             #[cfg(feature = "camera")]

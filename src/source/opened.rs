@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo};
+use super::{DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo, video};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
@@ -10,7 +10,7 @@ use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 use crate::capture::pipewire::PipeWireCamera;
-use crate::capture::replay::{PlayRange, Replay};
+use crate::capture::replay::Replay;
 #[cfg(feature = "camera")]
 use crate::capture::stereo_pair::StereoPair;
 use crate::capture::synthetic::{self, Format};
@@ -69,13 +69,7 @@ impl Opened {
             SourceName::Folder(folder) => {
                 let recording = Arc::new(Recording::open(folder, &request.recording_options())?);
                 let name = folder.display().to_string();
-                let part = PlayRange {
-                    start_s: frames.start.unwrap_or(0.0),
-                    end_s: frames.end,
-                    looped: frames.repeat,
-                    frames: frames.frames,
-                };
-                let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;
                 let pair = recording.stereo_geometry().cloned();
                 if pair.is_some() && request.uses_stereo(recording.has_depth()) {
                     camera = camera.with_right_camera();
@@ -104,6 +98,7 @@ impl Opened {
                 let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
             }
+            SourceName::Video(path) => Ok(without_depth(Box::new(video::open(path, frames, false)?))),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {
                 let camera =

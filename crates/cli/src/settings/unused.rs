@@ -243,7 +243,7 @@ pub fn warn_of_no_depth(source: FrameOrigin) {
             "`bokehcam models get` installs a network that finds people, or a map NAME-depth.png beside NAME gives the \
              depth"
         }
-        FrameOrigin::Source(Kind::Recording) => {
+        FrameOrigin::Source(Kind::Recording | Kind::Video) => {
             "`bokehcam models get` installs a network that finds people, or --depth FOLDER uses the depth of another \
              recording"
         }
