@@ -19,6 +19,13 @@ pub enum CaptureError {
     /// The video file cannot be read.
     #[error(transparent)]
     Video(#[from] VideoError),
+    /// A stream is not y4m, or ends too early.
+    #[error("{source_name}: {what}")]
+    Y4m {
+        source_name: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
     /// No frame lies between start and end.
     #[error(
         "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",
