@@ -6,6 +6,7 @@
 #[doc(hidden)]
 pub mod command;
 mod decoder;
+mod encryption;
 mod error;
 mod probe;
 #[doc(hidden)]

@@ -9,6 +9,7 @@ use serde::Deserialize;
 
 use super::VideoError;
 use super::command::{FFPROBE, base_command, file_url};
+use super::encryption::is_encrypted;
 use super::process::Process;
 use crate::color::YcbcrMatrix;
 use crate::files::input;
@@ -88,14 +89,18 @@ impl VideoFile {
     /// # Errors
     /// The file is not a regular one, empty, encrypted, unreadable, or has no video; ffprobe is missing.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let file = input::open(path).and_then(|file| file.metadata()).map_err(VideoError::io(path))?;
-        if file.len() == 0 {
+        let mut file = input::open(path).map_err(VideoError::io(path))?;
+        if file.metadata().map_err(VideoError::io(path))?.len() == 0 {
             return Err(VideoError::Empty { path: path.to_owned() });
+        }
+        if is_encrypted(&mut file).map_err(VideoError::io(path))? {
+            return Err(VideoError::Encrypted { path: path.to_owned() });
         }
         let answer = ask(&mut probe_command(path), path)?;
         let is_video = |stream: &&Stream| is_kind(stream, "video") && stream.disposition.attached_pic == 0;
         let video = answer.streams.iter().find(is_video);
-        let size = video.and_then(|video| video.width.zip(video.height)).filter(|&(width, height)| width.min(height) > 0);
+        let size =
+            video.and_then(|video| video.width.zip(video.height)).filter(|&(width, height)| width.min(height) > 0);
         let (Some(video), Some(size)) = (video, size) else {
             return Err(VideoError::NoVideo { path: path.to_owned() });
         };
