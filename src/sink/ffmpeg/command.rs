@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use super::container::Container;
 use crate::color::YcbcrMatrix;
+use crate::sink::Sound;
 use crate::video::command::{FFMPEG, base_command, file_url, frame_timing_option};
 
 /// Output parameters of ffmpeg, selected by the file's extension.
@@ -72,6 +73,25 @@ pub(super) fn encode_command(format: &Format, part: &Path, height: u32, threads:
     command
 }
 
+/// Builds the command that copies the pictures of `from` to `to`, and beside them `length_s` seconds of `sound`.
+pub(super) fn sound_command(format: &Format, from: &Path, sound: &Sound, length_s: f64, to: &Path) -> Command {
+    let muxer = match format.container {
+        Container::Mp4 => &["-movflags", "+faststart", "-f", "mp4"],
+        Container::Matroska => format.muxer,
+    };
+    let mut command = base_command(FFMPEG);
+    command
+        .args(["-nostdin", "-y", "-i"])
+        .arg(file_url(from))
+        .args(["-protocol_whitelist", "file"])
+        .args(["-ss", &format!("{:.6}", sound.start_s), "-t", &format!("{length_s:.6}"), "-i"])
+        .arg(file_url(&sound.path))
+        .args(["-map", "0:v", "-map", "1:a", "-c", "copy", "-fflags", "+bitexact"])
+        .args(muxer)
+        .arg(file_url(to));
+    command
+}
+
 /// Builds the command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before
 /// it has the whole file.
 pub(super) fn faststart_command(from: &Path, to: &Path) -> Command {
@@ -81,6 +101,5 @@ pub(super) fn faststart_command(from: &Path, to: &Path) -> Command {
         .arg(file_url(from))
         .args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"])
         .arg(file_url(to));
-    command.stdin(Stdio::null());
     command
 }
