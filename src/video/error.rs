@@ -36,7 +36,8 @@ pub enum VideoError {
     TooLarge { path: PathBuf, width: u32, height: u32 },
     /// The file is truncated or damaged.
     #[error(
-        "{}: damaged or cut short after {frames} frames: {what}; copy or export it again, or use --keep-going",
+        "{}: damaged or cut short after {frames} frames: {what}; copy or export it again, or accept it \
+         by `stream --keep-going`",
         path.display()
     )]
     Damaged {
@@ -45,6 +46,29 @@ pub enum VideoError {
         frames: u64,
         /// The first messages of ffmpeg.
         what: String,
+    },
+    /// A video of depth does not cover the pictures.
+    #[error(
+        "{}: the depth is {}x{}, which does not cover pictures of {}x{}; export it with the same aspect",
+        path.display(), found.0, found.1, color.0, color.1
+    )]
+    DepthSize {
+        path: PathBuf,
+        /// Width and height of the depth.
+        found: (u32, u32),
+        /// Width and height of the pictures.
+        color: (u32, u32),
+    },
+    /// A video of depth belongs to other pictures.
+    #[error(
+        "{}: its depth has {frames} frames, and the pictures have {needed} or more; export the depth of every frame",
+        path.display()
+    )]
+    FrameCount {
+        path: PathBuf,
+        frames: u64,
+        /// Number of colour frames, as far as it is known.
+        needed: u64,
     },
     /// ffmpeg does nothing any more.
     #[error("{}: ffmpeg hung, and was killed", path.display())]
