@@ -7,12 +7,17 @@ use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, S
 use crate::frame::{ColorImage, Stamp};
 use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
+/// How long before the end of a lap the decoder of the next one starts, in seconds.
+const LAP_STARTUP_S: f64 = 1.0;
+
 /// Plays a video file in frame order; a lap of a loop is a new run of the decoder.
 pub struct Video {
     file: VideoFile,
     conversion: Conversion,
     range: PlayRange,
     decoder: Decoder,
+    /// The decoder of the next lap, begun shortly before the end of this one: it takes a while to start.
+    next_lap: Option<Decoder>,
     /// The next picture, or the part of it that has arrived.
     picture: ColorImage,
     /// Media time of `picture`, once it is whole.
@@ -54,6 +59,7 @@ impl Video {
             conversion,
             range,
             decoder,
+            next_lap: None,
             ready_ns: None,
             fault: None,
             has_ended: false,
@@ -89,6 +95,7 @@ impl Video {
                 Ok(Decoded::Picture(time_ns)) => {
                     let time_ns = time_ns.unwrap_or_else(|| self.estimate_time_ns());
                     self.in_lap += 1;
+                    self.prepare_next_lap(time_ns)?;
                     if self.range.end_s.is_some_and(|end_s| time_ns as f64 >= end_s * 1e9) {
                         self.end_lap()?;
                     } else if self.conversion.start_s > 0.0 || time_ns as f64 >= self.range.start_s * 1e9 {
@@ -132,7 +139,20 @@ impl Video {
         }
         self.lap_began_ns = self.last_ns.unwrap_or(0).saturating_add(self.period_ns());
         (self.in_lap, self.lap_start_ns) = (0, None);
-        self.decoder = Decoder::start(&self.file, &self.conversion)?;
+        self.decoder = match self.next_lap.take() {
+            Some(decoder) => decoder,
+            None => Decoder::start(&self.file, &self.conversion)?,
+        };
+        Ok(())
+    }
+
+    /// Starts the decoder of the next lap if this one, which is at `time_ns` in the file, ends soon.
+    fn prepare_next_lap(&mut self, time_ns: i64) -> Result<(), VideoError> {
+        let end_s = [self.range.end_s, self.file.length_s].into_iter().flatten().reduce(f64::min);
+        let ends_soon = end_s.is_some_and(|end_s| time_ns as f64 / 1e9 + LAP_STARTUP_S >= end_s);
+        if self.range.looped && ends_soon && self.next_lap.is_none() {
+            self.next_lap = Some(Decoder::start(&self.file, &self.conversion)?);
+        }
         Ok(())
     }
 }

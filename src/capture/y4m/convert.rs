@@ -140,7 +140,10 @@ mod tests {
         // BT.709's red, in limited range.
         for chroma in ["420", "422", "444"] {
             let out = plain(&format!("YUV4MPEG2 W2 H720 C{chroma}"), [63, 102, 240]);
-            assert!(out.rgb.as_chunks::<3>().0.iter().all(|rgb| rgb[0] >= 253 && rgb[1] <= 2 && rgb[2] <= 2), "{chroma}");
+            assert!(
+                out.rgb.as_chunks::<3>().0.iter().all(|rgb| rgb[0] >= 253 && rgb[1] <= 2 && rgb[2] <= 2),
+                "{chroma}"
+            );
         }
     }
 

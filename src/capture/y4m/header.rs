@@ -41,17 +41,14 @@ impl Header {
     pub fn parse(line: &str) -> Result<Self, String> {
         let mut words = line.split(' ');
         if words.next() != Some(MAGIC) {
-            return Err(format!("it does not begin with {MAGIC}: pipe y4m into it, as `ffmpeg -f yuv4mpegpipe -` writes it"));
+            return Err(format!(
+                "it does not begin with {MAGIC}: pipe y4m into it, as `ffmpeg -f yuv4mpegpipe -` writes it"
+            ));
         }
         let (mut width, mut height) = (None, None);
         // 4:2:0 is the default of the format.
-        let mut header = Self {
-            size_px: (0, 0),
-            fps: None,
-            chroma: Chroma::Quarter,
-            range: Range::Limited,
-            is_interlaced: false,
-        };
+        let mut header =
+            Self { size_px: (0, 0), fps: None, chroma: Chroma::Quarter, range: Range::Limited, is_interlaced: false };
         let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE_PX).contains(side));
         for word in words.filter(|word| !word.is_empty()) {
             let (tag, value) = word.split_at(word.chars().next().map_or(0, char::len_utf8));
@@ -92,7 +89,9 @@ fn parse_rate(text: &str) -> Result<Option<f64>, String> {
     let number = |text: &str| text.parse::<u32>().map(f64::from).map_err(|_| wrong());
     match (number(frames)?, number(seconds)?) {
         (0.0, 0.0) => Ok(None),
-        (frames, seconds) => Some(frames / seconds).filter(|rate| (0.1..=1000.0).contains(rate)).map(Some).ok_or_else(wrong),
+        (frames, seconds) => {
+            Some(frames / seconds).filter(|rate| (0.1..=1000.0).contains(rate)).map(Some).ok_or_else(wrong)
+        }
     }
 }
 
@@ -103,7 +102,9 @@ fn parse_chroma(text: &str) -> Result<Chroma, String> {
         "420" | "420jpeg" | "420mpeg2" | "420paldv" => Ok(Chroma::Quarter),
         "422" => Ok(Chroma::Half),
         "444" => Ok(Chroma::Full),
-        _ => Err(format!("its pixels C{text} are not 4:2:0, 4:2:2, 4:4:4 or mono in 8 bits: give ffmpeg -pix_fmt yuv420p")),
+        _ => Err(format!(
+            "its pixels C{text} are not 4:2:0, 4:2:2, 4:4:4 or mono in 8 bits: give ffmpeg -pix_fmt yuv420p"
+        )),
     }
 }
 
@@ -125,7 +126,10 @@ mod tests {
             ("YUV4MPEG2 W640 H480 F25:1", header),
             ("YUV4MPEG2 H480 W640  F0:0 I?", Header { fps: None, ..header }),
             ("YUV4MPEG2 W640 H480 F25:1 It", Header { is_interlaced: true, ..header }),
-            ("YUV4MPEG2 W640 H480 F25:1 C422 XCOLORRANGE=FULL", Header { chroma: Chroma::Half, range: Range::Full, ..header }),
+            (
+                "YUV4MPEG2 W640 H480 F25:1 C422 XCOLORRANGE=FULL",
+                Header { chroma: Chroma::Half, range: Range::Full, ..header },
+            ),
             ("YUV4MPEG2 W640 H480 F25:1 C444 XCOLORRANGE=LIMITED", Header { chroma: Chroma::Full, ..header }),
             ("YUV4MPEG2 W640 H480 F25:1 Cmono", Header { chroma: Chroma::Mono, ..header }),
         ] {

@@ -55,7 +55,9 @@ impl Y4m {
     /// Standard input is a terminal or closed, or the header is not one of y4m.
     pub fn stdin(limit: Option<u64>) -> Result<Self, CaptureError> {
         if io::stdin().is_terminal() {
-            return Err(fault("it is a terminal: pipe y4m into it, such as `ffmpeg -i FILE.mp4 -f yuv4mpegpipe - | ...`"));
+            return Err(fault(
+                "it is a terminal: pipe y4m into it, such as `ffmpeg -i FILE.mp4 -f yuv4mpegpipe - | ...`",
+            ));
         }
         Self::new(PipeReader::stdin().map_err(|error| fault(error.to_string()))?, limit)
     }
