@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::{DepthOrigin, Frames, Source, SourceError, photo, suggestion, video};
-use crate::capture::demo;
+use crate::capture::{demo, y4m};
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -28,6 +28,8 @@ pub enum Kind {
     Photo,
     /// A video file.
     Video,
+    /// A stream of y4m on standard input.
+    Stdin,
     /// The synthetic scene.
     Synthetic,
 }
@@ -54,6 +56,8 @@ pub enum SourceName {
     Photo(PathBuf),
     /// A video file.
     Video(PathBuf),
+    /// A stream of y4m on standard input.
+    Stdin,
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(NamedCamera),
@@ -83,6 +87,7 @@ impl fmt::Display for SourceName {
         match self {
             SourceName::Synthetic => f.write_str(SYNTHETIC),
             SourceName::Demo => f.write_str(demo::NAME),
+            SourceName::Stdin => f.write_str(y4m::NAME),
             SourceName::Folder(path) | SourceName::Photo(path) | SourceName::Video(path) => path.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
@@ -98,10 +103,14 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording, demo or synthetic"
         }
-        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic",
-        false => "a photo (PNG or JPEG), a video, a folder with a recording, demo or synthetic",
+        true => {
+            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording, demo or synthetic"
+        }
+        false => {
+            "a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording, demo or synthetic"
+        }
     }
 }
 
@@ -192,12 +201,14 @@ impl SourceName {
             Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
+            Some(y4m::NAME) => Ok(SourceName::Stdin),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
             _ if let Some(video) = video::parse(path) => video,
-            _ if path.is_file() => {
-                SourceError::usage_error(format!("it is neither a folder, a photo nor a video: use {}", accepted_sources()))
-            }
+            _ if path.is_file() => SourceError::usage_error(format!(
+                "it is neither a folder, a photo nor a video: use {}",
+                accepted_sources()
+            )),
             Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
             None => Err(missing_folder_error(&path.display().to_string())),
@@ -221,6 +232,7 @@ impl SourceName {
             SourceName::Folder(_) => Kind::Recording,
             SourceName::Photo(_) => Kind::Photo,
             SourceName::Video(_) => Kind::Video,
+            SourceName::Stdin => Kind::Stdin,
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Kind::Camera,
             #[cfg(feature = "camera")]
@@ -242,6 +254,11 @@ impl SourceName {
             }
             SourceName::Synthetic => SYNTHETIC,
             SourceName::Demo => demo::NAME,
+            SourceName::Stdin if frames.start.is_some() || frames.end.is_some() || frames.repeat => {
+                let what = "--start, --end and --loop are for recordings and videos: standard input is read only once";
+                return Err(SourceError::Usage(what.to_owned()));
+            }
+            SourceName::Stdin => return Ok(()),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => "a camera",
             #[cfg(feature = "camera")]
@@ -280,9 +297,8 @@ impl SourceName {
     /// Returns the device nodes of its cameras.
     pub fn device_nodes(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) | SourceName::Video(_) => {
-                Vec::new()
-            },
+            SourceName::Synthetic | SourceName::Demo | SourceName::Stdin => Vec::new(),
+            SourceName::Folder(_) | SourceName::Photo(_) | SourceName::Video(_) => Vec::new(),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Vec::new(),
             #[cfg(feature = "camera")]

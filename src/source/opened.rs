@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo, video};
+use super::{DepthChoice, DepthOrigin, OpenRequest, Options, SourceError, SourceName, photo, video};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
@@ -16,6 +16,7 @@ use crate::capture::stereo_pair::StereoPair;
 use crate::capture::synthetic::{self, Format};
 #[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
+use crate::capture::y4m::Y4m;
 #[cfg(feature = "camera")]
 use crate::clock::Clock;
 use crate::compute::thread_pool::core_count;
@@ -49,7 +50,7 @@ pub(super) struct Opened {
 impl Opened {
     /// Opens the source; right pictures are read only if stereo matching will use them.
     pub fn open(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
-        let Options { frames, .. } = request.options;
+        let Options { frames, depth_choice, .. } = request.options;
         let without_depth = |camera| Self {
             camera,
             depth: None,
@@ -98,7 +99,12 @@ impl Opened {
                 let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
             }
-            SourceName::Video(path) => Ok(without_depth(Box::new(video::open(path, frames, false)?))),
+            SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
+            SourceName::Video(path) => {
+                // A seek would lose count of the frames.
+                let by_index = matches!(depth_choice, DepthChoice::Video(_));
+                Ok(without_depth(Box::new(video::open(path, frames, by_index)?)))
+            }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {
                 let camera =

@@ -19,12 +19,12 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
     let devices = source.device_nodes();
-    let depth_folder = match &blur.depth {
-        DepthChoice::Folder(folder) => Some(folder.as_path()),
+    let depth_path = match &blur.depth {
+        DepthChoice::Folder(path) | DepthChoice::Video(path) => Some(path.as_path()),
         _ => None,
     };
     for (index, target) in targets.iter().enumerate() {
-        for read in source.path().into_iter().chain(depth_folder) {
+        for read in source.path().into_iter().chain(depth_path) {
             let path = target.path().filter(|_| !target.is_camera());
             path.map_or(Ok(()), |path| refuse_overwriting_source("--to", path, read))?;
         }

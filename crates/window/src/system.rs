@@ -122,9 +122,10 @@ impl System {
     /// Returns the depth choice of a method. Depth from elsewhere on the command line counts as the source's own.
     fn depth_choice_for(&self, depth_method: DepthMethod) -> DepthChoice {
         match (depth_method, &self.options.depth_choice) {
-            (DepthMethod::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
-                choice.clone()
-            }
+            (
+                DepthMethod::Measured,
+                choice @ (DepthChoice::Folder(_) | DepthChoice::Video(_) | DepthChoice::Device(_) | DepthChoice::Auto),
+            ) => choice.clone(),
             (
                 DepthMethod::Person,
                 DepthChoice::SingleCamera(SingleCameraDepth { plate: None, matte: Some(file), .. }),

@@ -68,6 +68,7 @@ type Requirement = (&'static [&'static str], Reason);
 const NEEDS_OF_SOURCE: &[Requirement] = &[
     (&["size", "fps"], |run| match run.source {
         FrameOrigin::Source(Kind::Recording) => Some("a recording has its own"),
+        FrameOrigin::Source(Kind::Stdin) => Some("the stream on standard input has its own"),
         FrameOrigin::Source(Kind::Demo) => Some("the demonstration has its own"),
         FrameOrigin::Source(Kind::Photo) => Some("a photo has its own size and only one frame"),
         _ => None,
