@@ -123,8 +123,9 @@ fn pictures_are_as_large_and_upright_as_a_player_shows_them() {
     let folder = tempfile::tempdir().unwrap();
     // The left half is white.
     let halves = "color=black:s=34x18:d=0.08:r=25,format=gray,geq=lum='255*lt(X,W/2)'";
-    for (degrees, size, white_at) in
-        [(0, (34, 18), 0), (90, (18, 34), 0), (180, (34, 18), 33), (270, (18, 34), 33 * 18)]
+    // This tag turns counterclockwise.
+    let corner = 34 * 18 - 1;
+    for (degrees, size, white_at) in [(0, (34, 18), 0), (90, (18, 34), corner), (180, (34, 18), 33), (270, (18, 34), 0)]
     {
         let flat = clip(folder.path(), "flat.mp4", halves, "-c:v libx264 -pix_fmt yuv420p");
         let file = folder.path().join("turned.mp4");
@@ -134,7 +135,7 @@ fn pictures_are_as_large_and_upright_as_a_player_shows_them() {
         let played = play_all(&file);
         assert_eq!(played.size, size, "{degrees}");
         let pixel = |at: usize| played.pictures[0].rgb[3 * at];
-        assert!(pixel(white_at) > 240 && pixel(34 * 18 - 1 - white_at) < 15, "{degrees}");
+        assert!(pixel(white_at) > 240 && pixel(corner - white_at) < 15, "{degrees}");
     }
     for (size, arguments, expected) in [
         ("33x17", "-c:v ffv1 -pix_fmt yuv444p", (33, 17)),
@@ -288,7 +289,7 @@ fn depth_in_a_second_video_belongs_to_the_frame_of_its_number() {
             }
         }
         let played = with(&depth, Frames { frames: Some(3), ..Frames::default() }, true).unwrap();
-        assert_eq!(played.depths_m[0], DepthMap::FAR_M, "{size}");
+        assert_eq!(played.depths_m[0], DepthMap::relative_to_metres(0.0), "{size}");
         assert!(played.depths_m[1] > played.depths_m[2], "{size}");
     }
     for (size, length_s, what) in [("64x48", "0.4", "10 frames"), ("64x64", "0.8", "aspect")] {

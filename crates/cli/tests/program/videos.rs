@@ -67,14 +67,19 @@ fn without_ffmpeg_a_video_is_one_line() {
 fn sound_stays_with_its_part_of_the_pictures() {
     let home = home_with_clip();
     let video = |name: &str, length| (name.to_owned(), length);
-    for (args, length) in [("", 20), ("--start 0.5 --end 1.5", 10), ("--frames 12", 6), ("--start 1.5 --size 32x24", 5)] {
-        home.run(&[&["stream", "clip.mp4", "--effect", "none", "--force", "--to", "out.mp4"][..], &words(args)].concat())
-            .done();
+    for (args, length) in [("", 20), ("--start 0.5 --end 1.5", 10), ("--frames 12", 6), ("--start 1.5 --size 32x24", 5)]
+    {
+        home.run(
+            &[&["stream", "clip.mp4", "--effect", "none", "--force", "--to", "out.mp4"][..], &words(args)].concat(),
+        )
+        .done();
         let found = streams(&home, "out.mp4");
         assert_eq!((found.len(), &found[0]), (2, &video("h264", length)), "{args}");
         assert!(found[1].0 == "aac" && found[1].1.abs_diff(length) <= 1, "{args}: {found:?}");
     }
-    for (args, said) in [("--to out.webm", "without the sound"), ("--loop --frames 50 --to loop.mp4", "without its sound")] {
+    for (args, said) in
+        [("--to out.webm", "without the sound"), ("--loop --frames 50 --to loop.mp4", "without its sound")]
+    {
         let ran = home.run(&[&["stream", "clip.mp4", "--effect", "none"][..], &words(args)].concat());
         assert!(ran.warning().contains(said), "{}", ran.stderr);
     }
@@ -113,7 +118,8 @@ fn a_video_is_blurred_the_same_twice_and_a_cut_one_is_kept_up_to_its_cut() {
 fn a_killed_run_leaves_no_decoder() {
     let home = home_with_clip();
     let mut run = crate::program::Beside::start(
-        home.command(&["-q", "stream", "clip.mp4", "--loop", "--pace", "realtime", "--to", "null"]).stderr(Stdio::null()),
+        home.command(&["-q", "stream", "clip.mp4", "--loop", "--pace", "realtime", "--to", "null"])
+            .stderr(Stdio::null()),
     );
     crate::program::until("it decodes", std::time::Duration::from_secs(60), || !run.children().is_empty());
     let decoder = run.children()[0];

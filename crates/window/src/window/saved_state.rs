@@ -56,9 +56,8 @@ impl SavedState {
     /// Returns the source, if its devices still exist; a stream on standard input is gone.
     pub fn restore_source(&self) -> Option<String> {
         let is_there = |name: &&String| {
-            SourceName::from_str(name).is_ok_and(|name| {
-                name.kind() != Kind::Stdin && name.device_nodes().iter().all(|node| node.exists())
-            })
+            SourceName::from_str(name)
+                .is_ok_and(|name| name.kind() != Kind::Stdin && name.device_nodes().iter().all(|node| node.exists()))
         };
         self.source.as_ref().filter(is_there).cloned()
     }
