@@ -29,7 +29,7 @@
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link` (the crate `bokehcam-link`), [`budget`], [`network`], [`stats`], [`recording`], `v4l2`, `pipewire`, `control` |
+//! | 3 | `link` (the crate `bokehcam-link`), [`budget`], [`network`], [`stats`], [`recording`], [`video`], `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`], [`layout`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`camera_control`], `files` |
 //! | 0 | `names` |
@@ -91,3 +91,5 @@ pub mod stats;
 #[cfg(feature = "camera")]
 #[doc(hidden)]
 pub mod v4l2;
+#[cfg(feature = "files")]
+pub mod video;

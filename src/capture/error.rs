@@ -7,6 +7,7 @@ use crate::pipewire::PipeWireError;
 use crate::recording::RecordingError;
 #[cfg(feature = "camera")]
 use crate::v4l2::live::OpenError;
+use crate::video::VideoError;
 
 /// Why a source delivers no frame.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -15,6 +16,16 @@ pub enum CaptureError {
     /// The recording's picture cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The video file cannot be read.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// A stream is not y4m, or ends too early.
+    #[error("{source_name}: {what}")]
+    Y4m {
+        source_name: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
     /// No frame lies between start and end.
     #[error(
         "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",

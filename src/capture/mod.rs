@@ -13,6 +13,8 @@ pub mod stereo_pair;
 pub mod synthetic;
 #[cfg(feature = "camera")]
 pub mod v4l2;
+pub mod video;
+pub mod y4m;
 
 use std::sync::Arc;
 use std::time::Duration;

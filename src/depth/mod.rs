@@ -31,10 +31,14 @@ pub mod registration;
 pub mod single_camera;
 pub mod stereo;
 mod tap;
+#[cfg(feature = "files")]
+pub mod video;
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 #[cfg(feature = "files")]
 use crate::recording::RecordingError;
+#[cfg(feature = "files")]
+use crate::video::VideoError;
 
 /// Provides the depth map of each frame.
 ///
@@ -117,6 +121,10 @@ pub enum DepthError {
     #[cfg(feature = "files")]
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The video of the depth cannot be read.
+    #[cfg(feature = "files")]
+    #[error(transparent)]
+    Video(#[from] VideoError),
     /// A depth camera has delivered no map yet. Later frames may have one.
     #[error("{source_name}: no depth yet")]
     Unpaired {

@@ -29,6 +29,7 @@ pub mod yuv;
 pub mod yuyv;
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -199,6 +200,15 @@ impl Sink for Null {
     }
 }
 
+/// The sound of a video file, which belongs to its pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sound {
+    /// The file that has it.
+    pub path: PathBuf,
+    /// Time in that file at which the pictures begin, in seconds.
+    pub start_s: f64,
+}
+
 /// Parameters for opening a sink.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -218,6 +228,8 @@ pub struct Options {
     pub demand: Option<Demand>,
     /// For a filter: the name of the PipeWire camera whose readers get the pictures, or a part of it.
     pub filter_target: Option<String>,
+    /// The sound to copy into a video that ffmpeg writes.
+    pub sound: Option<Sound>,
     /// Set when the run has to end: from then on, stalled processes and readers are no longer waited for.
     pub stop: Arc<AtomicBool>,
 }
@@ -235,6 +247,7 @@ impl Options {
             threads: None,
             demand: None,
             filter_target: None,
+            sound: None,
             stop,
         }
     }

@@ -12,8 +12,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, ioctl_fionread};
 
-/// How long a stalled reader is waited for once the run has to stop.
-pub(super) const STOP_TIMEOUT: Duration = Duration::from_secs(1);
+use crate::video::process::STOP_TIMEOUT;
+
 /// How often a blocked writer checks whether to continue waiting.
 const TICK: Duration = Duration::from_millis(50);
 /// Minimum free space of a pipe when `poll` reports it as writable (`PIPE_BUF`): writing this much does not block.

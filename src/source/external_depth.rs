@@ -1,7 +1,9 @@
 //! External depth for a source, from another recording or a depth camera.
 
 use super::opened::recorded_depth_origin;
-use super::{DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera};
+use super::{
+    DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera, video,
+};
 use crate::capture::FrameData;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -43,6 +45,10 @@ pub(super) fn add_external_depth(
             first_depth = request.read_first_depth(&recording);
             (Box::new(LoopedRecording::new(recording, &folder.display().to_string())?), depth_from)
         }
+        DepthChoice::Video(file) => {
+            request.check_relative_depth(DepthOrigin::Relative)?;
+            (Box::new(video::open_depth(file, &source, name, depth)?), DepthOrigin::Relative)
+        }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
         DepthChoice::SingleCamera(chosen) => return single_camera::add_depth(source, chosen, name, request),
         DepthChoice::Defocus => {
@@ -66,7 +72,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(
-            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording",
+            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording or a video of depth",
             DepthChoice::suggest_keyword(name)
         ))),
         Err(error) => Err(error.into()),

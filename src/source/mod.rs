@@ -28,6 +28,7 @@ pub mod registration;
 pub mod single_camera;
 mod stereo;
 mod suggestion;
+pub mod video;
 
 pub use error::SourceError;
 pub use name::{Kind, SourceName};

@@ -5,8 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, containers, photo, suggestion};
-use crate::capture::demo;
+use super::{DepthOrigin, Frames, Source, SourceError, containers, photo, suggestion, video};
+use crate::capture::{demo, y4m};
 use crate::recording::pictures;
 
 /// The name of the synthetic scene.
@@ -27,6 +27,10 @@ pub enum Kind {
     Demo,
     /// A photo: a single frame.
     Photo,
+    /// A video file.
+    Video,
+    /// A stream of y4m on standard input.
+    Stdin,
     /// The synthetic scene.
     Synthetic,
 }
@@ -51,6 +55,10 @@ pub enum SourceName {
     Folder(PathBuf),
     /// A PNG or JPEG.
     Photo(PathBuf),
+    /// A video file.
+    Video(PathBuf),
+    /// A stream of y4m on standard input.
+    Stdin,
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(NamedCamera),
@@ -74,19 +82,14 @@ fn is_path(text: &str) -> bool {
     text.contains('/') && !text.starts_with("/dev/")
 }
 
-/// Returns whether a file is a video, by its extension.
-fn is_video(path: &Path) -> bool {
-    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
-    ["mp4", "mkv", "webm", "mov", "avi", "m4v", "y4m"].contains(&ending.as_str())
-}
-
 /// Writes the name so that it parses again.
 impl fmt::Display for SourceName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             SourceName::Synthetic => f.write_str(SYNTHETIC),
             SourceName::Demo => f.write_str(demo::NAME),
-            SourceName::Folder(path) | SourceName::Photo(path) => path.display().fmt(f),
+            SourceName::Stdin => f.write_str(y4m::NAME),
+            SourceName::Folder(path) | SourceName::Photo(path) | SourceName::Video(path) => path.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
@@ -101,12 +104,14 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
         }
         true => {
-            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic"
+            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
         }
-        false => "a photo (PNG or JPEG), a folder with a recording or pictures, demo or synthetic",
+        false => {
+            "a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
+        }
     }
 }
 
@@ -197,19 +202,17 @@ impl SourceName {
             Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
+            Some(y4m::NAME) => Ok(SourceName::Stdin),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
             _ if path.is_file() && containers::is_container(path) => {
                 SourceError::usage_error(containers::describe_conversion(path))
             }
-            Some(text) if path.is_file() && is_video(path) => SourceError::usage_error(format!(
-                "a video must be split into pictures first; ffmpeg makes a folder of them, which is then the source: \
-                 mkdir -p clip/rgb && ffmpeg -i '{text}' -r 25 clip/rgb/%06d.png && (cd clip && ls rgb/* | awk \
-                 '{{print NR/25, $0}}' > rgb.txt)"
+            _ if let Some(video) = video::parse(path) => video,
+            _ if path.is_file() => SourceError::usage_error(format!(
+                "it is neither a folder, a photo nor a video: use {}",
+                accepted_sources()
             )),
-            _ if path.is_file() => {
-                SourceError::usage_error(format!("it is neither a folder nor a photo: use {}", accepted_sources()))
-            }
             _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
             Some(text) if is_path(text) => Err(missing_folder_error(text)),
             Some(text) => parse_cameras(text),
@@ -233,6 +236,8 @@ impl SourceName {
             SourceName::Demo => Kind::Demo,
             SourceName::Folder(_) => Kind::Recording,
             SourceName::Photo(_) => Kind::Photo,
+            SourceName::Video(_) => Kind::Video,
+            SourceName::Stdin => Kind::Stdin,
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Kind::Camera,
             #[cfg(feature = "camera")]
@@ -246,14 +251,19 @@ impl SourceName {
     /// Such an option is given, and this is not a recording.
     pub fn check_frames(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
-            SourceName::Folder(_) => return Ok(()),
+            SourceName::Folder(_) | SourceName::Video(_) => return Ok(()),
             SourceName::Photo(_) if frames.start.is_none() && frames.end.is_none() => return Ok(()),
             SourceName::Photo(_) => {
-                let what = "--start and --end are for recordings: a photo is one frame; --loop --frames N repeats it";
+                let what = "--start and --end are for recordings and videos: a photo is one frame; --loop --frames N repeats it";
                 return Err(SourceError::Usage(what.to_owned()));
             }
             SourceName::Synthetic => SYNTHETIC,
             SourceName::Demo => demo::NAME,
+            SourceName::Stdin if frames.start.is_some() || frames.end.is_some() || frames.repeat => {
+                let what = "--start, --end and --loop are for recordings and videos: standard input is read only once";
+                return Err(SourceError::Usage(what.to_owned()));
+            }
+            SourceName::Stdin => return Ok(()),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => "a camera",
             #[cfg(feature = "camera")]
@@ -263,15 +273,15 @@ impl SourceName {
             return Ok(());
         }
         Err(SourceError::Usage(format!(
-            "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
+            "--start, --end and --loop are for recordings and videos: {what} never ends, give it --frames"
         )))
     }
 
-    /// Returns the folders that a recording is read from, or the file of a photo.
+    /// Returns the folders that a recording is read from, or the file of a photo or video.
     pub fn input_paths(&self) -> Vec<PathBuf> {
         match self {
             SourceName::Folder(path) => pictures::input_folders(path),
-            SourceName::Photo(path) => vec![path.clone()],
+            SourceName::Photo(path) | SourceName::Video(path) => vec![path.clone()],
             _ => Vec::new(),
         }
     }
@@ -293,7 +303,8 @@ impl SourceName {
     /// Returns the device nodes of its cameras.
     pub fn device_nodes(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),
+            SourceName::Synthetic | SourceName::Demo | SourceName::Stdin => Vec::new(),
+            SourceName::Folder(_) | SourceName::Photo(_) | SourceName::Video(_) => Vec::new(),
             #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(_) => Vec::new(),
             #[cfg(feature = "camera")]

@@ -4,18 +4,19 @@ use std::sync::Arc;
 
 #[cfg(feature = "camera")]
 use super::name;
-use super::{DepthOrigin, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo};
+use super::{DepthChoice, DepthOrigin, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 use crate::capture::pipewire::PipeWireCamera;
-use crate::capture::replay::{PlayRange, Replay};
+use crate::capture::replay::Replay;
 #[cfg(feature = "camera")]
 use crate::capture::stereo_pair::StereoPair;
 use crate::capture::synthetic::{self, Format};
 #[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
+use crate::capture::y4m::Y4m;
 #[cfg(feature = "camera")]
 use crate::clock::Clock;
 use crate::compute::thread_pool::core_count;
@@ -52,7 +53,7 @@ pub(super) struct Opened {
 impl Opened {
     /// Opens the source; right pictures are read only if stereo matching will use them.
     pub fn open(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
-        let Options { frames, .. } = request.options;
+        let Options { frames, depth_choice, .. } = request.options;
         let without_depth = |camera| Self {
             camera,
             depth: None,
@@ -74,13 +75,7 @@ impl Opened {
                 let recording = Arc::new(Recording::open(folder, &request.options.recording_options())?);
                 let name = folder.display().to_string();
                 warn_of_own_properties(&recording, frames);
-                let part = PlayRange {
-                    start_s: frames.start.unwrap_or(0.0),
-                    end_s: frames.end,
-                    looped: frames.repeat,
-                    frames: frames.frames,
-                };
-                let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;
                 let pair = recording.stereo_geometry().cloned();
                 if pair.is_some() && request.uses_stereo(recording.has_depth()) {
                     camera = camera.with_right_camera();
@@ -112,6 +107,12 @@ impl Opened {
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
                 let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, notes, ..without_depth(Box::new(camera)) })
+            }
+            SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
+            SourceName::Video(path) => {
+                // A seek would lose count of the frames.
+                let by_index = matches!(depth_choice, DepthChoice::Video(_));
+                Ok(without_depth(Box::new(video::open(path, frames, by_index)?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {

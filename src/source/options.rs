@@ -13,6 +13,7 @@ use clap::Args;
 #[cfg(feature = "clap")]
 use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 
+use super::video::is_video;
 #[cfg(feature = "clap")]
 use crate::depth::stereo::Settings;
 #[cfg(feature = "clap")]
@@ -175,6 +176,8 @@ pub enum DepthChoice {
     None,
     /// The depth of the recording in this folder.
     Folder(PathBuf),
+    /// A video of relative depth, frame by frame.
+    Video(PathBuf),
     /// A depth camera, by its path or name.
     Device(String),
     /// A clean plate or networks, from the pictures alone.
@@ -186,7 +189,7 @@ pub enum DepthChoice {
 impl DepthChoice {
     /// Returns whether the depth is not the source's own.
     pub fn is_external(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Device(_) | Self::SingleCamera(_) | Self::Defocus)
+        matches!(self, Self::Folder(_) | Self::Video(_) | Self::Device(_) | Self::SingleCamera(_) | Self::Defocus)
     }
 
     /// Returns a hint for a message if a text resembles a keyword.
@@ -208,12 +211,13 @@ impl FromStr for DepthChoice {
             "defocus" => Self::Defocus,
             "" => {
                 return Err(
-                    "use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording, or a depth camera"
+                    "use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording, a video of depth, or a depth camera"
                         .to_string(),
                 );
             }
             text if let Some(chosen) = SingleCameraDepth::parse(text) => Self::SingleCamera(chosen?),
             folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
+            file if Path::new(file).is_file() && is_video(Path::new(file)) => Self::Video(file.into()),
             device => Self::Device(device.to_owned()),
         })
     }

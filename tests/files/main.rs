@@ -8,3 +8,4 @@ mod recording;
 mod scripts;
 mod sinks;
 mod style;
+mod video;

@@ -62,6 +62,7 @@ Where depth comes from:
   plate[:FILE]  a picture of the background without you, taken at the start if there is no FILE
                 (the camera must not move)
   FOLDER        a recording, whose depth is played in a loop
+  FILE          a video of relative depth, for a video of as many frames (white is near)
   CAMERA        a depth camera: /dev/videoN, N, or part of its name";
 
 /// Help of `--depth` for a single picture.

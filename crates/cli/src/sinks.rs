@@ -20,11 +20,11 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
     let devices = source.device_nodes();
-    let depth_folder = match &blur.depth {
-        DepthChoice::Folder(folder) => Some(folder.as_path()),
+    let depth_path = match &blur.depth {
+        DepthChoice::Folder(path) | DepthChoice::Video(path) => Some(path.as_path()),
         _ => None,
     };
-    let inputs: Vec<PathBuf> = source.input_paths().into_iter().chain(depth_folder.map(Path::to_owned)).collect();
+    let inputs: Vec<PathBuf> = source.input_paths().into_iter().chain(depth_path.map(Path::to_owned)).collect();
     for (index, target) in targets.iter().enumerate() {
         for read in &inputs {
             let path = target.path().filter(|_| !target.is_camera());

@@ -102,8 +102,8 @@ impl System {
         if let Some(depth_method) = depth_method {
             options.depth_choice = self.depth_choice_for(depth_method);
         }
-        // Only recordings and photos end.
-        options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
+        // Only recordings, videos and photos end.
+        options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Video | Kind::Photo);
         if let Some((_, size, fps)) = self.chosen_mode.as_ref().filter(|(camera, ..)| camera == name) {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
@@ -122,9 +122,10 @@ impl System {
     /// Returns the depth choice of a method. Depth from elsewhere on the command line counts as the source's own.
     fn depth_choice_for(&self, depth_method: DepthMethod) -> DepthChoice {
         match (depth_method, &self.options.depth_choice) {
-            (DepthMethod::Measured, choice @ (DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Auto)) => {
-                choice.clone()
-            }
+            (
+                DepthMethod::Measured,
+                choice @ (DepthChoice::Folder(_) | DepthChoice::Video(_) | DepthChoice::Device(_) | DepthChoice::Auto),
+            ) => choice.clone(),
             (
                 DepthMethod::Person,
                 DepthChoice::SingleCamera(SingleCameraDepth { plate: None, matte: Some(file), .. }),
@@ -173,7 +174,7 @@ impl System {
             self.own_depth_methods = (called, own);
         }
         let mut depth_methods = self.own_depth_methods.1.clone();
-        if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Photo) {
+        if matches!(name.kind(), Kind::Camera | Kind::Recording | Kind::Video | Kind::Photo) {
             let installed = source::installed_networks();
             depth_methods.extend(installed.matte.is_some().then_some(DepthMethod::Person));
             depth_methods.extend(
@@ -214,7 +215,8 @@ impl Services for System {
             return Err(NO_NETWORK.to_owned());
         }
         // A recording can be opened twice to check it; a camera is busy.
-        let is_file = SourceName::from_str(name).is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Photo));
+        let is_file = SourceName::from_str(name)
+            .is_ok_and(|name| matches!(name.kind(), Kind::Recording | Kind::Video | Kind::Photo));
         if is_file { self.open_source(name, Some(depth_method)).map(drop) } else { Ok(()) }
     }
 

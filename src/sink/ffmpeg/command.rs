@@ -1,16 +1,12 @@
-//! Command lines of ffmpeg.
+//! Command lines of ffmpeg for writing.
 
-use std::ffi::OsString;
-use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use super::container::Container;
-use super::process::read_output_within;
 use crate::color::YcbcrMatrix;
-
-const PROGRAM: &str = "ffmpeg";
+use crate::sink::Sound;
+use crate::video::command::{FFMPEG, base_command, file_url, frame_timing_option};
 
 /// Output parameters of ffmpeg, selected by the file's extension.
 pub(super) struct Format {
@@ -60,8 +56,9 @@ pub(super) fn encode_command(format: &Format, part: &Path, height: u32, threads:
         "crop=trunc(iw/2)*2:trunc(ih/2)*2,\
          setparams=range=tv:colorspace={color}:color_primaries={color}:color_trc={color}"
     );
-    let mut command = base_command();
+    let mut command = base_command(FFMPEG);
     command
+        .args(["-nostdin", "-y"])
         .args(["-f", "matroska", "-i", "pipe:0"])
         .args(["-vf", &filters, "-pix_fmt", "yuv420p", "-color_range", "tv"])
         .args(["-colorspace", color, "-color_primaries", color, "-color_trc", color])
@@ -76,68 +73,33 @@ pub(super) fn encode_command(format: &Format, part: &Path, height: u32, threads:
     command
 }
 
+/// Builds the command that copies the pictures of `from` to `to`, and beside them `length_s` seconds of `sound`.
+pub(super) fn sound_command(format: &Format, from: &Path, sound: &Sound, length_s: f64, to: &Path) -> Command {
+    let muxer = match format.container {
+        Container::Mp4 => &["-movflags", "+faststart", "-f", "mp4"],
+        Container::Matroska => format.muxer,
+    };
+    let mut command = base_command(FFMPEG);
+    command
+        .args(["-nostdin", "-y", "-i"])
+        .arg(file_url(from))
+        .args(["-protocol_whitelist", "file"])
+        .args(["-ss", &format!("{:.6}", sound.start_s), "-t", &format!("{length_s:.6}"), "-i"])
+        .arg(file_url(&sound.path))
+        .args(["-map", "0:v", "-map", "1:a", "-c", "copy", "-fflags", "+bitexact"])
+        .args(muxer)
+        .arg(file_url(to));
+    command
+}
+
 /// Builds the command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before
 /// it has the whole file.
 pub(super) fn faststart_command(from: &Path, to: &Path) -> Command {
-    let mut command = base_command();
+    let mut command = base_command(FFMPEG);
     command
-        .arg("-i")
+        .args(["-nostdin", "-y", "-i"])
         .arg(file_url(from))
         .args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"])
         .arg(file_url(to));
-    command.stdin(Stdio::null());
     command
-}
-
-/// Builds an ffmpeg command in a process group of its own, which logs only errors and overwrites its output file.
-fn base_command() -> Command {
-    let mut command = Command::new(PROGRAM);
-    command
-        .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        // Ctrl-C on a terminal signals the whole group, and ffmpeg must survive until the last frame.
-        .process_group(0);
-    command
-}
-
-/// Prefixes the path as a file, so that ffmpeg interprets neither a dash as an option nor a colon as a protocol.
-fn file_url(path: &Path) -> OsString {
-    let mut name = OsString::from("file:");
-    name.push(path);
-    name
-}
-
-/// Returns the name of the option by which frames keep their times: `-fps_mode` since ffmpeg 5.1, `-vsync` before,
-/// which later versions no longer support.
-fn frame_timing_option() -> &'static str {
-    let text = read_output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
-    if text.as_deref().and_then(parse_version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }
-}
-
-/// Parses `ffmpeg version 5.1.9-0+deb12u1 Copyright ...` to (5, 1).
-fn parse_version(text: &str) -> Option<(u32, u32)> {
-    let number = text.strip_prefix("ffmpeg version ")?.split_whitespace().next()?.trim_start_matches('n');
-    let mut parts = number.split(|c: char| !c.is_ascii_digit());
-    Some((parts.next()?.parse().ok()?, parts.next().and_then(|minor| minor.parse().ok()).unwrap_or(0)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn versions_are_read_as_builds_state_them() {
-        for (text, expected) in [
-            ("ffmpeg version 5.1.9-0+deb12u1 Copyright (c) 2000-2026", Some((5, 1))),
-            ("ffmpeg version n6.0-10-g1 Copyright", Some((6, 0))),
-            ("ffmpeg version 4.4.2-0ubuntu0.22.04.1 Copyright", Some((4, 4))),
-            ("ffmpeg version 7.1 Copyright", Some((7, 1))),
-            ("ffmpeg version 8", Some((8, 0))),
-            ("ffmpeg version N-109542-g0a7c6b4 Copyright", None),
-            ("something else", None),
-        ] {
-            assert_eq!(parse_version(text), expected, "{text}");
-        }
-    }
 }

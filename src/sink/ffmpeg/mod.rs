@@ -2,7 +2,6 @@
 
 mod command;
 mod container;
-mod process;
 mod raw;
 
 use std::io::{self, ErrorKind};
@@ -16,13 +15,13 @@ use std::time::Duration;
 
 use self::command::Format;
 use self::container::Container;
-use self::process::{Process, ProcessEnd};
 use self::raw::RawVideo;
 use super::output::OutputFile;
 use super::pipe::Pipe;
-use super::{Ending, Options, Sink, SinkError, check_size};
+use super::{Ending, Options, Sink, SinkError, Sound, check_size};
 use crate::files::atomic_file::PartFile;
 use crate::frame::ColorImage;
+use crate::video::process::{Process, ProcessEnd};
 
 /// Longest wait for an encoder to start reading; frames are sent to it in any case.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -35,6 +34,10 @@ pub struct Ffmpeg {
     format: Format,
     output: OutputFile,
     size: (u32, u32),
+    sound: Option<Sound>,
+    period_ns: u64,
+    /// Times of the first and the last frame.
+    span_ns: Option<(u64, u64)>,
     stop: Arc<AtomicBool>,
 }
 
@@ -60,7 +63,17 @@ impl Ffmpeg {
         let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns));
         let input = input.map_err(SinkError::write(path))?;
         input.writer.wait_drained(STARTUP_TIMEOUT).map_err(SinkError::write(path))?;
-        Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
+        Ok(Self {
+            input: Some(input),
+            process,
+            format,
+            output,
+            size: options.size,
+            sound: options.sound.clone(),
+            period_ns: options.period_ns,
+            span_ns: None,
+            stop: Arc::clone(&options.stop),
+        })
     }
 
     /// Closes the input of ffmpeg and waits for its end, or kills it if it `is_hung`; then checks its file.
@@ -70,28 +83,38 @@ impl Ffmpeg {
         check_outcome(ended, self.output.path(), self.output.part_path(), self.format.container)
     }
 
-    /// Copies an mp4 to one with its index at the front. If that fails, for example on a full disk, the file stays as
-    /// it is.
-    fn move_index_to_front(&mut self) {
-        if self.format.container != Container::Mp4 {
-            return;
+    /// Copies the file to one with the sound, and an mp4 to one with its index at the front. If that fails, for example
+    /// on a full disk, the file stays as it is.
+    fn improve_file(&mut self) {
+        if let Some((sound, (first_ns, last_ns))) = self.sound.take().zip(self.span_ns) {
+            let start_s = sound.start_s + first_ns as f64 / 1e9;
+            let length_s = (last_ns - first_ns + self.period_ns) as f64 / 1e9;
+            let sound = Sound { start_s, ..sound };
+            match self.copy(|from, to| command::sound_command(&self.format, from, &sound, length_s, to)) {
+                Ok(part) => return self.output.replace_part(part),
+                Err(error) => tracing::warn!(
+                    "{}: without the sound of {}, which cannot be copied: {error}",
+                    self.output.path().display(),
+                    sound.path.display()
+                ),
+            }
         }
-        let indexed =
-            PartFile::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
-                let command = command::faststart_command(self.output.part_path(), part.part_path());
-                run_ffmpeg(command, &self.stop, self.output.path(), part.part_path()).map(|()| part)
-            });
-        match indexed {
-            Ok(part) => self.output.replace_part(part),
-            Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),
+        if self.format.container == Container::Mp4 {
+            match self.copy(command::faststart_command) {
+                Ok(part) => self.output.replace_part(part),
+                Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),
+            }
         }
     }
-}
 
-/// Runs ffmpeg to write `part`, which must then be a complete mp4.
-fn run_ffmpeg(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
-    let ended = Process::start(&mut command, stop).and_then(|mut process| process.wait());
-    check_outcome(ended, path, part, Container::Mp4)
+    /// Runs the command that copies the file to a new one, and returns that.
+    fn copy(&self, command: impl Fn(&Path, &Path) -> Command) -> Result<PartFile, SinkError> {
+        let path = self.output.path();
+        let part = PartFile::create(path).map_err(SinkError::write(path))?;
+        let mut command = command(self.output.part_path(), part.part_path());
+        let ended = Process::start(&mut command, &self.stop).and_then(|mut process| process.wait());
+        check_outcome(ended, path, part.part_path(), self.format.container).map(|()| part)
+    }
 }
 
 /// Messages of ffmpeg about frames missing from a file, though its exit status may be success.
@@ -136,6 +159,7 @@ impl Sink for Ffmpeg {
         }
         let Err(cause) = input.write_frame(frame, time_ns) else {
             self.output.frames += 1;
+            self.span_ns = Some((self.span_ns.map_or(time_ns, |(first_ns, _)| first_ns), time_ns));
             return Ok(ControlFlow::Continue(()));
         };
         let path = self.output.path().to_owned();
@@ -164,7 +188,7 @@ impl Sink for Ffmpeg {
         let ended = self.finish_encoding(false);
         match self.output.check_exists().and(ended) {
             Ok(()) => {
-                self.move_index_to_front();
+                self.improve_file();
                 self.output.complete(ending)
             }
             Err(error) => Err(self.output.fail(error)),

@@ -30,7 +30,8 @@ Examples:
   bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
-    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, `demo` or `synthetic`
+    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, a video, - (y4m on standard input), `demo` or
+    /// `synthetic`
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     /// Folder for the recording

@@ -51,6 +51,7 @@ Examples:
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
+  bokehcam stream somewhere/clip.mp4 --to blurred.mp4
   bokehcam stream demo --frames 90 --to out/
   bokehcam stream demo --frames 90 --to out.mp4 --aperture polygon:6 --focus 1.2
   bokehcam stream demo --to - --quiet --pace realtime | ffplay -
@@ -59,8 +60,8 @@ Examples:
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
-    /// PipeWire camera (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
-    /// `synthetic` (a scene, rendered frame by frame)
+    /// PipeWire camera (pipewire:NAME), a folder with a recording, a video (FILE.mp4 and others, by ffmpeg), a photo (PNG
+    /// or JPEG), - (y4m on standard input), `demo` (the demonstration) or `synthetic` (a scene, rendered frame by frame)
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
@@ -174,6 +175,16 @@ impl StreamCommand {
         self.to.contains(&Target::Filter)
     }
 
+    /// Returns the sound of a video, if an output stores it.
+    fn find_sound(&self) -> Result<Option<sink::Sound>, CliError> {
+        match &self.source {
+            SourceName::Video(path) if self.to.iter().any(|target| matches!(target, Target::Video(_))) => {
+                Ok(source::video::find_sound(path, &self.parts.frames)?)
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// Opens the outputs. `demand` counts their watchers, `stop` ends them, and `closed` keeps pictures from them.
     fn open_outputs(
         &self,
@@ -191,6 +202,7 @@ impl StreamCommand {
             threads: options.computing.threads,
             demand: demand.cloned(),
             filter_target: self.source.pipewire_name().map(str::to_owned),
+            sound: self.find_sound()?,
             stop: Arc::clone(stop),
             ..sink::Options::new(info.size, info.period_ns)
         };

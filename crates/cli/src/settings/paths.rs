@@ -31,6 +31,7 @@ pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {
                 chosen.to_string()
             }
             Ok(DepthChoice::Folder(_) | DepthChoice::Device(_)) if folder.join(value).is_dir() => absolute(value),
+            Ok(DepthChoice::Video(_) | DepthChoice::Device(_)) if folder.join(value).is_file() => absolute(value),
             _ => value.to_owned(),
         };
     }

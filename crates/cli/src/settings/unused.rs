@@ -67,6 +67,7 @@ type Requirement = (&'static [&'static str], Reason);
 /// Conditions that depend on the source alone.
 const NEEDS_OF_SOURCE: &[Requirement] = &[
     (&["size", "fps"], |run| match run.source {
+        FrameOrigin::Source(Kind::Stdin) => Some("the stream on standard input has its own"),
         FrameOrigin::Source(Kind::Demo) => Some("the demonstration has its own"),
         FrameOrigin::Source(Kind::Photo) => Some("a photo has its own size and only one frame"),
         _ => None,
@@ -242,7 +243,7 @@ pub fn warn_of_no_depth(source: FrameOrigin) {
             "`bokehcam models get` installs a network that finds people, or a map NAME-depth.png beside NAME gives the \
              depth"
         }
-        FrameOrigin::Source(Kind::Recording) => {
+        FrameOrigin::Source(Kind::Recording | Kind::Video) => {
             "`bokehcam models get` installs a network that finds people, or --depth FOLDER uses the depth of another \
              recording"
         }

@@ -38,3 +38,4 @@ mod render;
 mod settings;
 mod stereo;
 mod terminal;
+mod videos;

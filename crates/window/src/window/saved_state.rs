@@ -11,7 +11,7 @@ use crate::state::Preferences;
 use bokehcam::files::{atomic_file, input};
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::RecordingError;
-use bokehcam::source::SourceName;
+use bokehcam::source::{Kind, SourceName};
 
 /// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,10 +53,11 @@ impl SavedState {
         Some(Self { size, preferences: saved.preferences.into_valid(), ..saved })
     }
 
-    /// Returns the source, if its devices still exist.
+    /// Returns the source, if its devices still exist; a stream on standard input is gone.
     pub fn restore_source(&self) -> Option<String> {
         let is_there = |name: &&String| {
-            SourceName::from_str(name).is_ok_and(|name| name.device_nodes().iter().all(|node| node.exists()))
+            SourceName::from_str(name)
+                .is_ok_and(|name| name.kind() != Kind::Stdin && name.device_nodes().iter().all(|node| node.exists()))
         };
         self.source.as_ref().filter(is_there).cloned()
     }

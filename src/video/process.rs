@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use crate::sink::pipe::STOP_TIMEOUT;
-
+/// How long a stalled process or reader is waited for once the run has to stop.
+pub const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Number of error lines that are kept: the cause comes last, but not always alone.
 const MAX_STDERR_LINES: usize = 4;
 /// A process that is idle for this long although it has work counts as hung; [`STOP_TIMEOUT`] once the run has to
@@ -23,7 +23,7 @@ const HANG_TIMEOUT: Duration = Duration::from_secs(10);
 const TICK: Duration = Duration::from_millis(10);
 
 /// A process in a group of its own. Dropping it kills the group.
-pub(super) struct Process {
+pub struct Process {
     child: Child,
     /// Its last lines on standard error, sent once it has closed that.
     stderr: Receiver<VecDeque<String>>,
@@ -31,7 +31,7 @@ pub(super) struct Process {
 }
 
 /// How a process ended.
-pub(super) struct ProcessEnd {
+pub struct ProcessEnd {
     /// `None` for a process that hung and was killed.
     pub status: Option<ExitStatus>,
     /// Its last error lines, joined by ` | `.
@@ -40,29 +40,54 @@ pub(super) struct ProcessEnd {
 
 impl Process {
     /// Starts a command whose standard error is piped. `stop` is set once the run has to stop.
-    pub(super) fn start(command: &mut Command, stop: &Arc<AtomicBool>) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// The program is missing, or the system refuses the process or its thread.
+    pub fn start(command: &mut Command, stop: &Arc<AtomicBool>) -> io::Result<Self> {
+        Self::start_logging(command, stop, |line| Some(line.to_owned()))
+    }
+
+    /// Does the same, and passes every line of standard error to `log`, which returns what to keep of it.
+    ///
+    /// # Errors
+    /// Same as for [`Process::start`].
+    pub fn start_logging(
+        command: &mut Command,
+        stop: &Arc<AtomicBool>,
+        log: impl FnMut(&str) -> Option<String> + Send + 'static,
+    ) -> io::Result<Self> {
         let mut child = command.spawn()?;
         let (stderr_sender, stderr) = mpsc::channel();
         // Read continuously: a process that fills the pipe would block, and this program with it.
         let reader = child.stderr.take().map(|stderr| {
             thread::Builder::new()
                 .name("ffmpeg".into())
-                .spawn(move || drop(stderr_sender.send(read_last_lines(stderr))))
+                .spawn(move || drop(stderr_sender.send(read_last_lines(stderr, log))))
         });
         let process = Self { child, stderr, stop: Arc::clone(stop) };
         reader.transpose().map(|_| process)
     }
 
-    pub(super) fn stdin(&mut self) -> Option<ChildStdin> {
+    /// Takes its standard input, if that is piped.
+    pub fn stdin(&mut self) -> Option<ChildStdin> {
         self.child.stdin.take()
     }
 
-    pub(super) fn watchdog(&self) -> Watchdog {
+    /// Takes its standard output, if that is piped.
+    pub fn stdout(&mut self) -> Option<ChildStdout> {
+        self.child.stdout.take()
+    }
+
+    /// Creates a watchdog for it.
+    pub fn watchdog(&self) -> Watchdog {
         Watchdog { pid: self.child.id(), stop: Arc::clone(&self.stop), cpu_ticks: None, last_active_at: Instant::now() }
     }
 
     /// Waits until it ends; kills it if it hangs.
-    pub(super) fn wait(&mut self) -> io::Result<ProcessEnd> {
+    ///
+    /// # Errors
+    /// The system cannot tell its state.
+    pub fn wait(&mut self) -> io::Result<ProcessEnd> {
         let (started, mut watchdog) = (Instant::now(), self.watchdog());
         let status = loop {
             if let Some(status) = self.child.try_wait()? {
@@ -77,7 +102,7 @@ impl Process {
     }
 
     /// Kills the hung process.
-    pub(super) fn kill_hung(&mut self) -> ProcessEnd {
+    pub fn kill_hung(&mut self) -> ProcessEnd {
         self.kill();
         ProcessEnd { status: None, stderr: self.last_stderr() }
     }
@@ -108,7 +133,7 @@ impl Drop for Process {
 }
 
 /// Detects whether a process hangs, by its processor time and its state.
-pub(super) struct Watchdog {
+pub struct Watchdog {
     pid: u32,
     stop: Arc<AtomicBool>,
     /// Processor time used when it was last seen to work.
@@ -118,7 +143,7 @@ pub(super) struct Watchdog {
 
 impl Watchdog {
     /// Whether it has been idle for too long, where the caller has waited for it for `waited`.
-    pub(super) fn is_hung(&mut self, waited: Duration) -> bool {
+    pub fn is_hung(&mut self, waited: Duration) -> bool {
         let (is_active, cpu_ticks) = read_activity(self.pid);
         if is_active || cpu_ticks != self.cpu_ticks {
             (self.cpu_ticks, self.last_active_at) = (cpu_ticks, Instant::now());
@@ -140,12 +165,12 @@ fn read_activity(pid: u32) -> (bool, Option<u64>) {
     (is_active, number(10).zip(number(0)).map(|(user, system)| user + system))
 }
 
-fn read_last_lines(stderr: impl Read) -> VecDeque<String> {
+fn read_last_lines(stderr: impl Read, mut log: impl FnMut(&str) -> Option<String>) -> VecDeque<String> {
     let mut lines = VecDeque::with_capacity(MAX_STDERR_LINES + 1);
     for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
-        let line = String::from_utf8_lossy(&line).trim().to_owned();
-        if !line.is_empty() {
-            lines.push_back(line);
+        let line = String::from_utf8_lossy(&line);
+        if !line.trim().is_empty() {
+            lines.extend(log(line.trim()));
         }
         if lines.len() > MAX_STDERR_LINES {
             lines.pop_front();
@@ -155,7 +180,7 @@ fn read_last_lines(stderr: impl Read) -> VecDeque<String> {
 }
 
 /// Returns a program's standard output, if it ends in time.
-pub(super) fn read_output_within(command: &mut Command, timeout: Duration) -> Option<String> {
+pub fn read_output_within(command: &mut Command, timeout: Duration) -> Option<String> {
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
     let mut stdout = child.stdout.take()?;
     let (output_sender, output) = mpsc::channel();

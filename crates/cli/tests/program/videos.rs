@@ -1,0 +1,130 @@
+//! Video files, and y4m on standard input, as sources of the whole program.
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use crate::program::{Home, PROGRAM, Ran};
+
+/// Returns a home with a clip of two seconds and 40 frames, with sound.
+fn home_with_clip() -> Home {
+    let home = Home::new();
+    let mut ffmpeg = Command::new("ffmpeg");
+    ffmpeg.args(["-v", "error", "-f", "lavfi", "-i", "testsrc=s=64x48:r=20:d=2", "-f", "lavfi", "-i", "sine=d=2"]);
+    ffmpeg.args(["-c:v", "libx264", "-pix_fmt", "yuv420p", "-c:a", "aac"]).arg(home.path("clip.mp4"));
+    Ran::of(&mut ffmpeg).done();
+    home
+}
+
+/// Returns the codec and the length, rounded to tenths of a second, of each stream of a file.
+fn streams(home: &Home, file: &str) -> Vec<(String, u32)> {
+    let mut probe = Command::new("ffprobe");
+    probe.args(["-v", "error", "-of", "csv=p=0", "-show_entries", "stream=codec_name,duration"]).arg(home.path(file));
+    let text = Ran::of(&mut probe).printed();
+    let stream = |line: &str| {
+        let (codec, length_s) = line.split_once(',').unwrap();
+        (codec.to_owned(), (length_s.trim_end_matches(',').parse::<f64>().unwrap() * 10.0).round() as u32)
+    };
+    text.lines().map(stream).collect()
+}
+
+#[test]
+fn y4m_passes_through_a_pipe() {
+    let home = Home::new();
+    let both = format!("'{PROGRAM}' -q stream synthetic --size 61x47 --frames 5 --effect none --to - | '{PROGRAM}' -q");
+    let pipe = |args: &str| Ran::of(home.within(Command::new("sh")).args(["-c", &format!("{both} {args}")]));
+    for to in ["one.y4m", "two.y4m"] {
+        pipe(&format!("stream - --effect none --to {to}")).done();
+    }
+    let [one, two] = ["one.y4m", "two.y4m"].map(|name| fs::read(home.path(name)).unwrap());
+    assert!(one == two && one.windows(6).filter(|bytes| bytes == b"FRAME\n").count() == 5);
+    pipe("record - --frames 3 --to take").done();
+    assert_eq!(fs::read_dir(home.path("take/rgb")).unwrap().count(), 3);
+    for (args, said) in [("--start 1", "--start"), ("--loop", "--loop"), ("--depth stereo", "--depth stereo")] {
+        pipe(&format!("stream - {args} --to null")).refused(2, &[said]);
+    }
+}
+
+#[test]
+fn a_wrong_header_is_one_line() {
+    let home = Home::new();
+    for (header, said) in [("", "yuv4mpegpipe"), ("RIFF\\n", "YUV4MPEG2"), ("YUV4MPEG2 W4 H4 C420p10\\n", "C420p10")] {
+        let script = format!("printf '{header}' | '{PROGRAM}' stream - --to null");
+        Ran::of(home.within(Command::new("sh")).args(["-c", &script])).refused(1, &["standard input: ", said]);
+    }
+}
+
+#[test]
+fn without_ffmpeg_a_video_is_one_line() {
+    let home = Home::new();
+    fs::write(home.path("clip"), b"\0\0\0\x0cftypisom").unwrap();
+    for command in ["stream clip --to null", "record clip --to take"] {
+        Ran::of(&mut home.shell("PATH=/nowhere;", command)).refused(1, &["clip", "install the package ffmpeg"]);
+    }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn sound_stays_with_its_part_of_the_pictures() {
+    let home = home_with_clip();
+    let video = |name: &str, length| (name.to_owned(), length);
+    for (args, length) in [("", 20), ("--start 0.5 --end 1.5", 10), ("--frames 12", 6), ("--start 1.5 --size 32x24", 5)]
+    {
+        home.run(
+            &[&["stream", "clip.mp4", "--effect", "none", "--force", "--to", "out.mp4"][..], &words(args)].concat(),
+        )
+        .done();
+        let found = streams(&home, "out.mp4");
+        assert_eq!((found.len(), &found[0]), (2, &video("h264", length)), "{args}");
+        assert!(found[1].0 == "aac" && found[1].1.abs_diff(length) <= 1, "{args}: {found:?}");
+    }
+    for (args, said) in
+        [("--to out.webm", "without the sound"), ("--loop --frames 50 --to loop.mp4", "without its sound")]
+    {
+        let ran = home.run(&[&["stream", "clip.mp4", "--effect", "none"][..], &words(args)].concat());
+        assert!(ran.warning().contains(said), "{}", ran.stderr);
+    }
+    assert_eq!(streams(&home, "loop.mp4"), [video("h264", 25)]);
+    assert!(home.path("out.webm").exists());
+}
+
+fn words(text: &str) -> Vec<&str> {
+    text.split_whitespace().collect()
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_video_is_blurred_the_same_twice_and_a_cut_one_is_kept_up_to_its_cut() {
+    let home = home_with_clip();
+    for to in ["one.y4m", "two.y4m"] {
+        home.run(&["stream", "clip.mp4", "--effect", "blur", "--pace", "asap", "--to", to]).done();
+    }
+    assert!(fs::read(home.path("one.y4m")).unwrap() == fs::read(home.path("two.y4m")).unwrap());
+
+    let mut remux = Command::new("ffmpeg");
+    remux.args(["-v", "error", "-i"]).arg(home.path("clip.mp4")).args(["-c", "copy"]).arg(home.path("clip.mkv"));
+    Ran::of(&mut remux).done();
+    let whole = fs::read(home.path("clip.mkv")).unwrap();
+    fs::write(home.path("cut.mkv"), &whole[..whole.len() / 2]).unwrap();
+    let cut = ["stream", "cut.mkv", "--effect", "none", "--to", "cut.y4m"];
+    home.run(&cut).failed(1, &["cut.mkv: damaged or cut short after"]);
+    assert!(home.path("cut.y4m").exists());
+    let ran = home.run(&[&cut[..], &["--keep-going", "--force"]].concat());
+    assert!(ran.warning().contains("cut short"), "{}", ran.stderr);
+    home.run(&["stream", "clip.mp4", "--effect", "none", "--to", "clip.mp4", "--force"]).refused(2, &["--to"]);
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_killed_run_leaves_no_decoder() {
+    let home = home_with_clip();
+    let mut run = crate::program::Beside::start(
+        home.command(&["-q", "stream", "clip.mp4", "--loop", "--pace", "realtime", "--to", "null"])
+            .stderr(Stdio::null()),
+    );
+    crate::program::until("it decodes", std::time::Duration::from_secs(60), || !run.children().is_empty());
+    let decoder = run.children()[0];
+    run.signal(rustix::process::Signal::KILL);
+    let gone = || fs::read(format!("/proc/{}/cmdline", decoder.as_raw_nonzero())).map_or(true, |line| line.is_empty());
+    crate::program::until("the decoder ends", std::time::Duration::from_secs(60), gone);
+    assert!(!run.runs());
+}

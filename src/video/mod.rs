@@ -1,0 +1,17 @@
+//! Video files, decoded by the programs ffmpeg and ffprobe as child processes.
+//!
+//! [`VideoFile`] says what a file contains, and [`Decoder`] reads its pictures in order. ffmpeg rotates and scales them
+//! and converts their colours; it opens no other file and no network for that.
+
+#[doc(hidden)]
+pub mod command;
+mod decoder;
+mod encryption;
+mod error;
+mod probe;
+#[doc(hidden)]
+pub mod process;
+
+pub use decoder::{Conversion, Decoded, Decoder, Pixels};
+pub use error::VideoError;
+pub use probe::VideoFile;
