@@ -8,8 +8,8 @@ use super::error::CliError;
 use super::files::refuse_overwriting_source;
 use super::options::Streaming;
 use bokehcam::files::place;
-use bokehcam::sink::{Backpressure, Options, Sink, Target, Tee};
-use bokehcam::source::{DepthChoice, SourceName};
+use bokehcam::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
+use bokehcam::source::{DepthChoice, Frames, SourceName, video};
 
 /// Refuses sinks that collide with each other or with an input, and options that need other sinks.
 ///
@@ -79,6 +79,19 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
             size.width + 1
         )),
         _ => Ok(()),
+    }
+}
+
+/// Returns the sound of a video, if an output stores it.
+///
+/// # Errors
+/// Fails if the video is unreadable.
+pub fn find_sound(targets: &[Target], source: &SourceName, frames: &Frames) -> Result<Option<Sound>, CliError> {
+    match source {
+        SourceName::Video(path) if targets.iter().any(|target| matches!(target, Target::Video(_))) => {
+            Ok(video::find_sound(path, frames)?)
+        }
+        _ => Ok(None),
     }
 }
 

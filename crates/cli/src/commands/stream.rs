@@ -175,16 +175,6 @@ impl StreamCommand {
         self.to.contains(&Target::Filter)
     }
 
-    /// Returns the sound of a video, if an output stores it.
-    fn find_sound(&self) -> Result<Option<sink::Sound>, CliError> {
-        match &self.source {
-            SourceName::Video(path) if self.to.iter().any(|target| matches!(target, Target::Video(_))) => {
-                Ok(source::video::find_sound(path, &self.parts.frames)?)
-            }
-            _ => Ok(None),
-        }
-    }
-
     /// Opens the outputs. `demand` counts their watchers, `stop` ends them, and `closed` keeps pictures from them.
     fn open_outputs(
         &self,
@@ -202,7 +192,7 @@ impl StreamCommand {
             threads: options.computing.threads,
             demand: demand.cloned(),
             filter_target: self.source.pipewire_name().map(str::to_owned),
-            sound: self.find_sound()?,
+            sound: sinks::find_sound(&self.to, &self.source, &self.parts.frames)?,
             stop: Arc::clone(stop),
             ..sink::Options::new(info.size, info.period_ns)
         };
