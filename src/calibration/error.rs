@@ -82,9 +82,13 @@ pub enum CalibrationError {
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
-    /// The file is not YAML.
-    #[error("not readable as YAML: {0}")]
-    Yaml(String),
+    /// The file does not have its format's syntax.
+    #[error("not readable as {format}: {what}")]
+    Syntax {
+        /// YAML, XML or INI.
+        format: &'static str,
+        what: String,
+    },
     /// A key is missing.
     #[error("{key} is missing; {hint}")]
     Missing { key: String, hint: &'static str },

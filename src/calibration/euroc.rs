@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DMat3, DVec3};
 
 use super::error::{CalibrationError, Fault};
-use super::yaml::{File, Value};
+use super::tree::{File, Value};
 use super::{CameraIntrinsics, StereoCalibration, entries};
 
 /// Remedy for a missing key.

@@ -3,7 +3,7 @@
 
 use super::error::CalibrationError;
 use super::euroc::require_pinhole;
-use super::yaml::{File, Value};
+use super::tree::{File, Value};
 use super::{CameraIntrinsics, StereoCalibration, entries};
 
 /// Remedy for a missing key.

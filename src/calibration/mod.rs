@@ -10,6 +10,8 @@ mod error;
 #[cfg(feature = "files")]
 pub mod euroc;
 #[cfg(feature = "files")]
+mod ini;
+#[cfg(feature = "files")]
 mod kalibr;
 pub mod lens;
 pub mod map;
@@ -17,6 +19,10 @@ pub mod map;
 mod opencv;
 pub mod rectification;
 pub mod rectifier;
+#[cfg(feature = "files")]
+mod tree;
+#[cfg(feature = "files")]
+mod xml;
 #[cfg(feature = "files")]
 mod yaml;
 
@@ -81,7 +87,7 @@ pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, Calibratio
     }
     let mut files = Vec::with_capacity(2);
     for path in paths {
-        files.push(yaml::File::open(path)?);
+        files.push(tree::File::open(path)?);
     }
     let has = |key| files[0].root().get(key).is_some();
     match files.as_slice() {
@@ -94,7 +100,7 @@ pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, Calibratio
         return Err(CalibrationError::Unknown(paths[0].to_owned()));
     }
     if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), find_companion_file(paths[0])) {
-        files.push(yaml::File::open(&other)?);
+        files.push(tree::File::open(&other)?);
     }
     opencv::from_files(&files)
 }

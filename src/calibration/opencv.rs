@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::error::{CalibrationError, Fault};
 use super::rectification::Rectification;
-use super::yaml::{File, Value};
+use super::tree::{File, Value};
 use super::{CameraIntrinsics, StereoCalibration, entries};
 
 /// A longer baseline must be in millimetres: no rig is that many metres wide.

@@ -47,5 +47,8 @@ fn is_yaml(file: &Path) -> bool {
 }
 
 fn is_unrecognized(error: &CalibrationError) -> bool {
-    matches!(error, CalibrationError::Unknown(_) | CalibrationError::File { fault: Fault::Yaml(_), .. })
+    matches!(
+        error,
+        CalibrationError::Unknown(_) | CalibrationError::File { fault: Fault::Syntax { format: "YAML", .. }, .. }
+    )
 }
