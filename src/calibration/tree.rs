@@ -61,10 +61,6 @@ impl File {
         }
     }
 
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     pub fn root(&self) -> Value<'_> {
         Value { path: &self.path, key: "the file", line: 0, kind: &self.root.kind }
     }

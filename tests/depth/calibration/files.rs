@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use bokehcam::calibration::{self, Distortion, StereoCalibration, euroc};
+use bokehcam::calibration::{self, Distortion, LengthUnit, StereoCalibration, euroc};
 use glam::{DVec2, DVec3};
 use tempfile::TempDir;
 
@@ -119,7 +119,11 @@ fn opencv_in_one_file_or_two() {
         assert_eq!(one, calibration::load_calibration(&[path]).unwrap(), "the other one lies beside it");
     }
 
-    assert!(one.assumed_mm && one.cameras[0].size.is_none() && one.stored_rectification.is_none());
+    assert!(
+        one.unit == LengthUnit::AssumedMillimetres
+            && one.cameras[0].size.is_none()
+            && one.stored_rectification.is_none()
+    );
     assert!((one.translation_m - DVec3::new(-0.0912, 0.002, -0.003)).length() < 1e-12);
     assert!((one.rotation * DVec3::Y - DVec3::new(0.0, 0.8, 0.6)).length() < 1e-12, "row by row");
     assert_eq!(one.cameras[1].center_px, DVec2::new(327.5, 261.5));
@@ -162,7 +166,7 @@ fn euroc_and_kalibr() {
     let rig = euroc::read_sensors(&paths[0], &paths[1]).unwrap();
     assert_eq!(rig, calibration::load_calibration(&[&paths[0], &paths[1]]).unwrap());
     assert_eq!(rig.cameras[0].size, Some((752, 480)));
-    assert!(!rig.is_swapped() && !rig.assumed_mm);
+    assert!(!rig.is_swapped() && rig.unit == LengthUnit::Stated);
     // 11 cm along the body's y, which is the cameras' x.
     assert!((rig.translation_m - DVec3::new(-0.11, 0.0, 0.0)).length() < 1e-12, "{}", rig.translation_m);
 
