@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod files;
+mod formats;
 mod geometry;
 mod pictures;
 mod real;
