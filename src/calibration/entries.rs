@@ -10,6 +10,8 @@ use super::tree::Value;
 const ROTATION_TOLERANCE: f64 = 1e-3;
 /// Maximum tilt of a sensor.
 const MAX_TILT_RAD: f64 = 0.5;
+/// Upper limit of a baseline, in any unit.
+const MAX_BASELINE: f64 = 1e5;
 /// Plausible focal lengths in pixels.
 const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
 
@@ -112,10 +114,13 @@ pub(super) fn parse_side(value: Value<'_>, number: f64) -> Result<u32, Calibrati
     Ok(number as u32)
 }
 
-/// Returns the `translation` between the cameras; fails if it is 0.
-pub(super) fn require_nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
-    if translation.length() < 1e-9 {
-        return Err(impossible_value(value, "puts both cameras in the same place (a baseline of 0)"));
+/// Returns the `translation` between the cameras; fails if its length is no baseline.
+pub(super) fn require_baseline(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
+    match translation.length() {
+        length if length < 1e-9 => {
+            Err(impossible_value(value, "puts both cameras in the same place (a baseline of 0)"))
+        }
+        length if length < MAX_BASELINE => Ok(translation),
+        _ => Err(impossible_value(value, "puts the cameras more than 100000 units apart")),
     }
-    Ok(translation)
 }

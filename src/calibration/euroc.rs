@@ -30,7 +30,7 @@ pub(super) fn from_files(left: &File, right: &File) -> Result<StereoCalibration,
     Ok(StereoCalibration {
         cameras: [read_camera(left.root())?, read_camera(right.root())?],
         rotation: body_to_right * left_rotation,
-        translation_m: entries::require_nonzero(right_pose, body_to_right * (left_place - right_place))?,
+        translation_m: entries::require_baseline(right_pose, body_to_right * (left_place - right_place))?,
         stored_rectification: None,
         unit: LengthUnit::Stated,
     })

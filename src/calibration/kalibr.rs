@@ -18,14 +18,14 @@ pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationErr
     Ok(StereoCalibration {
         cameras: [read_camera(cameras[0])?, read_camera(cameras[1])?],
         rotation,
-        translation_m: entries::require_nonzero(pose, translation_m)?,
+        translation_m: entries::require_baseline(pose, translation_m)?,
         stored_rectification: None,
         unit: LengthUnit::Stated,
     })
 }
 
-/// Reads the pose from the axes of cam0 ("cn minus 1") to those of cam1, and its entry. Kalibr's calibration with an IMU
-/// has the poses of both from the IMU's axes instead.
+/// Reads the pose from the axes of cam0 ("cn minus 1") to those of cam1, and its entry. A calibration with an IMU may
+/// have the poses of both from the IMU's axes instead.
 fn read_pose([left, right]: [Value<'_>; 2]) -> Result<(Value<'_>, (DMat3, DVec3)), CalibrationError> {
     if right.get("T_cn_cnm1").is_none()
         && let (Some(left), Some(right)) = (left.get("T_cam_imu"), right.get("T_cam_imu"))

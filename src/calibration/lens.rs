@@ -1,7 +1,7 @@
 //! Projection of points in space to pixels, and back to rays.
 //!
-//! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms; thin prism and
-//! tilted sensor: the equations of OpenCV's module calib3d.
+//! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms; thin prism
+//! and tilted sensor: the equations in the documentation of OpenCV's module calib3d.
 //! Equidistant: J. Kannala, S. Brandt, *A generic camera model and calibration method*, PAMI 28 (2006), eq. 6.
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
@@ -90,8 +90,8 @@ impl Distortion {
     }
 }
 
-/// Returns where a ray through `point`, on the plane at distance 1, meets the tilted sensor, seen along the sensor's own
-/// axis.
+/// Returns where the ray through `point`, on the plane at distance 1, meets the tilted sensor, seen along the sensor's
+/// own axis.
 fn tilt_sensor(point: DVec2, tilt_x_rad: f64, tilt_y_rad: f64) -> DVec2 {
     let turn = DMat3::from_rotation_y(-tilt_y_rad) * DMat3::from_rotation_x(-tilt_x_rad);
     let turned = turn * point.extend(1.0);

@@ -39,7 +39,7 @@ pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationErr
     Ok(StereoCalibration {
         cameras: [read_camera(require_camera(data, left)?)?, read_camera(require_camera(data, right)?)?],
         rotation,
-        translation_m: entries::require_nonzero(data, translation_m)?,
+        translation_m: entries::require_baseline(data, translation_m)?,
         stored_rectification: None,
         unit: LengthUnit::Stated,
     })

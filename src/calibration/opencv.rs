@@ -1,6 +1,6 @@
-//! Reads OpenCV's FileStorage, YAML or XML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2
-//! R T), the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two. ORB_SLAM2's settings have the same
-//! entries by other names (LEFT.K, RIGHT.P).
+//! Reads OpenCV's FileStorage, YAML or XML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2
+//! D2 R T), the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two. ORB_SLAM2's settings have the
+//! same entries by other names (LEFT.K, RIGHT.P).
 
 use glam::DVec3;
 
@@ -101,7 +101,7 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
             let translation = DVec3::from_array(place.parse_numbers::<3>(3, "3x1")?);
             (
                 entries::parse_rotation(rotation, &rotation.parse_numbers::<9>(3, "3x3")?)?,
-                entries::require_nonzero(place, translation)?,
+                entries::require_baseline(place, translation)?,
             )
         }
     };

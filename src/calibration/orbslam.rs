@@ -29,7 +29,7 @@ pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationErr
             Ok(StereoCalibration {
                 cameras: [read_camera(root, left)?, read_camera(root, "Camera2")?],
                 rotation,
-                translation_m: entries::require_nonzero(pose, -(rotation * place_m))?,
+                translation_m: entries::require_baseline(pose, -(rotation * place_m))?,
                 stored_rectification: None,
                 unit: LengthUnit::Stated,
             })
@@ -64,13 +64,13 @@ fn read_rectified(root: Value<'_>, name: &str) -> Result<StereoCalibration, Cali
         let lens = root.require(&format!("{name}.k1"), HINT)?;
         return impossible(lens, "is not 0, as it must be in a rectified pair without LEFT.K or Stereo.T_c1_c2");
     }
-    if baseline_m.is_nan() || baseline_m < 1e-9 {
-        return impossible(value, "is not a baseline above 0");
+    if baseline_m < 0.0 {
+        return impossible(value, "is below 0: the left camera would stand on the right");
     }
     Ok(StereoCalibration {
         cameras: [camera; 2],
         rotation: DMat3::IDENTITY,
-        translation_m: DVec3::new(-baseline_m, 0.0, 0.0),
+        translation_m: entries::require_baseline(value, DVec3::new(-baseline_m, 0.0, 0.0))?,
         stored_rectification: Some(Rectification {
             rotations: [DMat3::IDENTITY; 2],
             focal_px: camera.focal_px,

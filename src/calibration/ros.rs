@@ -1,6 +1,6 @@
 //! Reads ROS's camera_info of both cameras: the files that `camera_calibration` writes, and printed messages of
-//! `sensor_msgs/CameraInfo`, whose entries are K D R P. R and P rectify; the fourth column of P has the baseline (REP 104
-//! and the message's definition).
+//! `sensor_msgs/CameraInfo`, whose entries are K D R P. R and P rectify; the fourth column of P has the baseline (REP
+//! 104 and the message's definition).
 
 use super::error::CalibrationError;
 use super::tree::{File, Value};

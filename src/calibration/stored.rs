@@ -46,9 +46,7 @@ pub(super) fn parse_rectification(
     }
     // The fourth column is in pixels: focal length times translation.
     let shift = shift.x / focal_px.x;
-    if shift.abs() < 1e-9 {
-        return Err(impossible("puts both cameras in the same place (a baseline of 0)"));
-    }
+    entries::require_baseline(value, DVec3::new(shift, 0.0, 0.0))?;
     if (focal_px - right.focal_px).abs().max_element() > 1e-3 * focal_px.x || (left_px.y - right_px.y).abs() > 0.01 {
         return Err(impossible(
             "is not the partner of P1 in a rectified pair: focal lengths and rows must be the same",

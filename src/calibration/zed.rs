@@ -1,6 +1,6 @@
-//! Reads the factory calibration of ZED cameras, `SN*.conf`: both cameras at several picture sizes, and the pose between
-//! them, in the sense in which Stereolabs' `zed-opencv-stereo-calibration` writes it: the baseline in millimetres and the
-//! rotation vector RX CV RZ in radians.
+//! Reads the factory calibration of ZED cameras, `SN*.conf`: both cameras at several picture sizes, and the pose
+//! between them, as Stereolabs' `zed-stereo-calibration` writes it: the baseline in millimetres and the rotation vector
+//! RX CV RZ in radians.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -69,7 +69,7 @@ pub(super) fn from_file(file: &File, size: Option<(u32, u32)>) -> Result<StereoC
     Ok(StereoCalibration {
         cameras: [read_camera(root, "LEFT", mode, size)?, read_camera(root, "RIGHT", mode, size)?],
         rotation: DMat3::from_quat(DQuat::from_scaled_axis(turn)),
-        translation_m: entries::require_nonzero(baseline, translation_mm / MM_PER_M)?,
+        translation_m: entries::require_baseline(baseline, translation_mm / MM_PER_M)?,
         stored_rectification: None,
         unit: LengthUnit::Stated,
     })
