@@ -6,6 +6,7 @@ mod formats;
 mod geometry;
 mod pictures;
 mod real;
+mod writers;
 
 use bokehcam::calibration::{CameraIntrinsics, Distortion, LengthUnit, StereoCalibration};
 use glam::{DMat3, DQuat, DVec2, DVec3};
