@@ -1,4 +1,4 @@
-//! Parses YAML and JSON, and the YAML that OpenCV's FileStorage reads although it is none.
+//! Parses YAML and JSON, and OpenCV's FileStorage, whose YAML other parsers refuse.
 
 use saphyr_parser::{Event, Parser, ScanError};
 
