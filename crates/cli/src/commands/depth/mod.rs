@@ -216,9 +216,10 @@ impl DepthCommand {
         }
         let calibration = calib::read_pair_calibration(&self.calib, &self.left, size, self.baseline_m)?;
         let origin = if self.baseline_m.is_some() { "--baseline-m" } else { "by the calibration" };
-        note(format!("the cameras are {:.1} mm apart ({origin})", calibration.baseline_m() * 1e3));
+        let baseline = format!("the cameras are {:.1} mm apart ({origin})", calibration.baseline_m() * 1e3);
         match calibration {
             PairCalibration::Rectified { geometry, made_for } => {
+                note(baseline);
                 if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
                     let file = self.calib[0].display();
                     note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
@@ -227,6 +228,7 @@ impl DepthCommand {
             }
             PairCalibration::Raw(calibration) => {
                 let rectifier = Rectifier::new(&calibration, size)?;
+                note(baseline);
                 calibration.describe_doubt().iter().for_each(|doubt| log::warn(doubt));
                 calibration.describe_assumptions(size).into_iter().for_each(note);
                 Ok((Some(from_rig(rectifier.rig())), Some(rectifier)))
