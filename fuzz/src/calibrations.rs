@@ -6,7 +6,7 @@ use bokehcam_cli::parsers;
 
 use super::input::{assert_one_line, file_path, split_files, write_file};
 
-/// Reads OpenCV, Kalibr and EuRoC calibrations from one or two files, and rectifies pictures with them.
+/// Reads calibrations of all formats from one or two files, and rectifies pictures with them.
 pub fn calibration(data: &[u8]) {
     let (one, two) = ("intrinsics.yml", "other.yml");
     let read = match split_files(data).as_slice() {
@@ -19,7 +19,9 @@ pub fn calibration(data: &[u8]) {
         Err(error) => return assert_one_line(error),
     };
     assert!(!file_path("extrinsics.yml").exists());
-    let _ = (rig.baseline_m(), rig.is_swapped(), rig.with_swapped_cameras());
+    let _ = (rig.is_swapped(), rig.with_swapped_cameras());
+    rig.describe_doubt().into_iter().for_each(assert_one_line);
+    assert!((rig.with_baseline_m(0.1).baseline_m() - 0.1).abs() < 1e-9, "{rig:?}");
     let own = rig.cameras[0].size.unwrap_or((32, 24));
     for size in [(32, 24), (2, 2), (16, 16), (own.0.min(64), own.1.min(64))] {
         let _ = rig.describe_assumptions(size);

@@ -4,10 +4,14 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::Distortion;
 use super::error::{CalibrationError, Fault};
-use super::yaml::Value;
+use super::tree::Value;
 
 /// Largest deviation of a matrix from a rotation: calibrations are written with few digits.
 const ROTATION_TOLERANCE: f64 = 1e-3;
+/// Maximum tilt of a sensor.
+const MAX_TILT_RAD: f64 = 0.5;
+/// Upper limit of a baseline, in any unit.
+const MAX_BASELINE: f64 = 1e5;
 /// Plausible focal lengths in pixels.
 const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
 
@@ -45,18 +49,23 @@ pub(super) fn parse_distortion(model: Option<Value<'_>>, value: Value<'_>) -> Re
     };
     let is_vector = matrix.rows == 1 || matrix.cols == 1;
     match name.to_ascii_lowercase().replace('_', "-").as_str() {
+        // ROS writes no coefficients, and at times no model, for pictures without distortion.
+        "none" | "" | "plumb-bob" if matrix.data.is_empty() => Ok(Distortion::RadialTangential([0.0; 8])),
         "radial-tangential" | "radtan" | "plumb-bob" | "rational-polynomial" | "opencv" | "pinhole" => {
             if !is_vector || ![4, 5, 8, 12, 14].contains(&matrix.data.len()) {
                 return Err(wrong_size("a vector of 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)"));
             }
-            // The first 8 are k1 to k6, p1 and p2; any others belong to a thin prism or a tilted sensor.
-            let (used, unsupported) = matrix.data.split_at(matrix.data.len().min(8));
-            if unsupported.iter().any(|&coefficient| coefficient != 0.0) {
-                return Err(value.to_error(Fault::Prism { key: value.key() }));
+            let mut all = [0.0; 14];
+            all[..matrix.data.len()].copy_from_slice(&matrix.data);
+            if all[12..].iter().any(|tilt_rad| tilt_rad.abs() > MAX_TILT_RAD) {
+                return Err(impossible_value(value, "has a sensor that is tilted by more than 0.5 radians"));
             }
-            let mut all = [0.0; 8];
-            all[..used.len()].copy_from_slice(used);
-            Ok(Distortion::RadialTangential(all))
+            // The first 8 are k1 to k6, p1 and p2; the others belong to a thin prism and a tilted sensor.
+            let [k1, k2, p1, p2, k3, k4, k5, k6, rest @ ..] = all;
+            Ok(match rest == [0.0; 6] {
+                true => Distortion::RadialTangential([k1, k2, p1, p2, k3, k4, k5, k6]),
+                false => Distortion::PrismTilted(all),
+            })
         }
         "equidistant" | "fisheye" | "kannala-brandt" | "opencv-fisheye" => {
             let all = matrix.data.as_slice().try_into().ok().filter(|_| is_vector);
@@ -105,10 +114,13 @@ pub(super) fn parse_side(value: Value<'_>, number: f64) -> Result<u32, Calibrati
     Ok(number as u32)
 }
 
-/// Returns the `translation` between the cameras; fails if it is 0.
-pub(super) fn require_nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
-    if translation.length() < 1e-9 {
-        return Err(impossible_value(value, "puts both cameras in the same place (a baseline of 0)"));
+/// Returns the `translation` between the cameras; fails if its length is no baseline.
+pub(super) fn require_baseline(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
+    match translation.length() {
+        length if length < 1e-9 => {
+            Err(impossible_value(value, "puts both cameras in the same place (a baseline of 0)"))
+        }
+        length if length < MAX_BASELINE => Ok(translation),
+        _ => Err(impossible_value(value, "puts the cameras more than 100000 units apart")),
     }
-    Ok(translation)
 }

@@ -6,6 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 #[cfg(feature = "files")]
+use super::formats;
+#[cfg(feature = "files")]
 use crate::files::input::format_io_error;
 
 /// Error of reading or using a calibration.
@@ -17,17 +19,23 @@ pub enum CalibrationError {
     #[error("cannot read the calibration {}: {}", path.display(), format_io_error(source))]
     Io { path: PathBuf, source: io::Error },
     /// The format of the file is unknown.
-    #[error(
-        "{}: not a stereo calibration: looked for M1 D1 M2 D2 R T (OpenCV), cam0 and cam1 (Kalibr) and T_BS (EuRoC); \
-         name a file with one of them", .0.display()
-    )]
-    Unknown(PathBuf),
+    #[error("{}: not a stereo calibration that is read{hint}; the formats are {formats}", path.display())]
+    Unknown {
+        path: PathBuf,
+        /// What the most similar format has and the file lacks, if there is one.
+        hint: String,
+        formats: String,
+    },
     /// The number of files is wrong.
     #[error("a calibration consists of one or two files, but {0} were given")]
     Files(usize),
-    /// EuRoC has a file per camera, and one was given.
-    #[error("{}: this is the sensor.yaml of one camera; give those of both cameras, the left one first", .0.display())]
-    OneSensor(PathBuf),
+    /// The format has a file per camera, and one was given.
+    #[error("{}: this is the {format} of one camera; give those of both cameras, the left one first", path.display())]
+    OneCamera {
+        path: PathBuf,
+        /// The usual name of the file.
+        format: &'static str,
+    },
     /// An entry of a file is wrong.
     #[error("{}: {fault}", Location(path, *line))]
     File {
@@ -78,13 +86,26 @@ pub enum CalibrationError {
     LittleOverlap,
 }
 
+#[cfg(feature = "files")]
+impl CalibrationError {
+    /// Returns the error of a file of unknown format.
+    pub(crate) fn unknown_format(path: &Path) -> Self {
+        let hint = formats::find_similar(path).unwrap_or_default();
+        Self::Unknown { path: path.to_owned(), hint, formats: formats::list_formats() }
+    }
+}
+
 /// Fault of an entry.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
-    /// The file is not YAML.
-    #[error("not readable as YAML: {0}")]
-    Yaml(String),
+    /// The file does not have its format's syntax.
+    #[error("not readable as {format}: {what}")]
+    Syntax {
+        /// YAML, XML or INI.
+        format: &'static str,
+        what: String,
+    },
     /// A key is missing.
     #[error("{key} is missing; {hint}")]
     Missing { key: String, hint: &'static str },
@@ -126,12 +147,6 @@ pub enum Fault {
         /// The supported models.
         known: &'static str,
     },
-    /// Coefficients of unsupported terms are not 0.
-    #[error(
-        "{key} has nonzero coefficients beyond k6 (thin prism, tilt), which are not supported; calibrate without \
-         CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
-    )]
-    Prism { key: String },
 }
 
 /// A file and an optional line, for messages.

@@ -6,8 +6,8 @@ use std::path::Path;
 use glam::{DMat3, DVec3};
 
 use super::error::{CalibrationError, Fault};
-use super::yaml::{File, Value};
-use super::{CameraIntrinsics, StereoCalibration, entries};
+use super::tree::{File, Value};
+use super::{CameraIntrinsics, LengthUnit, StereoCalibration, entries};
 
 /// Remedy for a missing key.
 const HINT: &str = "copy sensor.yaml from the recording again";
@@ -30,9 +30,9 @@ pub(super) fn from_files(left: &File, right: &File) -> Result<StereoCalibration,
     Ok(StereoCalibration {
         cameras: [read_camera(left.root())?, read_camera(right.root())?],
         rotation: body_to_right * left_rotation,
-        translation_m: entries::require_nonzero(right_pose, body_to_right * (left_place - right_place))?,
+        translation_m: entries::require_baseline(right_pose, body_to_right * (left_place - right_place))?,
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     })
 }
 
@@ -55,11 +55,14 @@ fn read_camera(file: Value<'_>) -> Result<CameraIntrinsics, CalibrationError> {
     })
 }
 
+/// The models that are read, and how to get one of them.
+const MODELS: &str = "pinhole: calibrate again with pinhole-radtan, or with pinhole-equi for a fisheye";
+
 /// Refuses camera models other than a pinhole with a lens.
 pub(super) fn require_pinhole(camera: Value<'_>) -> Result<(), CalibrationError> {
     match camera.get("camera_model") {
         Some(model) if model.text()? != "pinhole" => {
-            Err(model.to_error(Fault::Model { key: model.key(), found: model.text()?.into(), known: "pinhole" }))
+            Err(model.to_error(Fault::Model { key: model.key(), found: model.text()?.into(), known: MODELS }))
         }
         _ => Ok(()),
     }

@@ -1,10 +1,12 @@
 //! Reads Kalibr's camchain: `cam0` and `cam1` with the pose between them (P. Furgale et al., *Unified temporal and
 //! spatial calibration for multi-sensor systems*, IROS 2013); the keys are those of Kalibr's page "YAML formats".
 
+use glam::{DMat3, DVec3};
+
 use super::error::CalibrationError;
 use super::euroc::require_pinhole;
-use super::yaml::{File, Value};
-use super::{CameraIntrinsics, StereoCalibration, entries};
+use super::tree::{File, Value};
+use super::{CameraIntrinsics, LengthUnit, StereoCalibration, entries};
 
 /// Remedy for a missing key.
 const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for both cameras";
@@ -12,16 +14,29 @@ const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for bo
 /// Reads the first two cameras of a chain.
 pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationError> {
     let cameras = [file.root().require("cam0", HINT)?, file.root().require("cam1", HINT)?];
-    // From the axes of cam0 ("cn minus 1") to those of cam1.
-    let pose = cameras[1].require("T_cn_cnm1", HINT)?;
-    let (rotation, translation_m) = entries::parse_pose(pose)?;
+    let (pose, (rotation, translation_m)) = read_pose(cameras)?;
     Ok(StereoCalibration {
         cameras: [read_camera(cameras[0])?, read_camera(cameras[1])?],
         rotation,
-        translation_m: entries::require_nonzero(pose, translation_m)?,
+        translation_m: entries::require_baseline(pose, translation_m)?,
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     })
+}
+
+/// Reads the pose from the axes of cam0 ("cn minus 1") to those of cam1, and its entry. A calibration with an IMU may
+/// have the poses of both from the IMU's axes instead.
+fn read_pose([left, right]: [Value<'_>; 2]) -> Result<(Value<'_>, (DMat3, DVec3)), CalibrationError> {
+    if right.get("T_cn_cnm1").is_none()
+        && let (Some(left), Some(right)) = (left.get("T_cam_imu"), right.get("T_cam_imu"))
+    {
+        let ((left_rotation, left_m), (right_rotation, right_m)) =
+            (entries::parse_pose(left)?, entries::parse_pose(right)?);
+        let rotation = right_rotation * left_rotation.transpose();
+        return Ok((right, (rotation, right_m - rotation * left_m)));
+    }
+    let pose = right.require("T_cn_cnm1", HINT)?;
+    Ok((pose, entries::parse_pose(pose)?))
 }
 
 /// Reads the camera under `cam0` or `cam1`.

@@ -1,9 +1,10 @@
 //! Projection of points in space to pixels, and back to rays.
 //!
-//! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms.
+//! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms; thin prism
+//! and tilted sensor: the equations in the documentation of OpenCV's module calib3d.
 //! Equidistant: J. Kannala, S. Brandt, *A generic camera model and calibration method*, PAMI 28 (2006), eq. 6.
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 
 use super::{CameraIntrinsics, Distortion};
 
@@ -17,7 +18,8 @@ impl Distortion {
     /// distance 1, without the tangential part.
     fn distort_radius(&self, radius: f64) -> f64 {
         match *self {
-            Self::RadialTangential([k1, k2, _, _, k3, k4, k5, k6]) => {
+            Self::RadialTangential([k1, k2, _, _, k3, k4, k5, k6])
+            | Self::PrismTilted([k1, k2, _, _, k3, k4, k5, k6, ..]) => {
                 let r2 = radius * radius;
                 radius * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
             }
@@ -34,11 +36,17 @@ impl Distortion {
         let r2 = point.length_squared();
         let radius = r2.sqrt();
         let distorted = if radius > 0.0 { point * (self.distort_radius(radius) / radius) } else { point };
-        let Self::RadialTangential([_, _, p1, p2, ..]) = *self else { return distorted };
+        let (p1, p2) = match *self {
+            Self::RadialTangential([_, _, p1, p2, ..]) | Self::PrismTilted([_, _, p1, p2, ..]) => (p1, p2),
+            Self::Equidistant(_) => return distorted,
+        };
         let cross = 2.0 * point.x * point.y;
         let across = p1 * cross + p2 * (r2 + 2.0 * point.x * point.x);
         let down = p1 * (r2 + 2.0 * point.y * point.y) + p2 * cross;
-        distorted + DVec2::new(across, down)
+        let decentered = distorted + DVec2::new(across, down);
+        let Self::PrismTilted([.., s1, s2, s3, s4, tilt_x_rad, tilt_y_rad]) = *self else { return decentered };
+        let prism = DVec2::new(r2 * (s1 + r2 * s2), r2 * (s3 + r2 * s4));
+        tilt_sensor(decentered + prism, tilt_x_rad, tilt_y_rad)
     }
 
     /// Returns the largest distance from the axis up to which the model is one-to-one, on the plane at distance 1:
@@ -82,6 +90,15 @@ impl Distortion {
     }
 }
 
+/// Returns where the ray through `point`, on the plane at distance 1, meets the tilted sensor, seen along the sensor's
+/// own axis.
+fn tilt_sensor(point: DVec2, tilt_x_rad: f64, tilt_y_rad: f64) -> DVec2 {
+    let turn = DMat3::from_rotation_y(-tilt_y_rad) * DMat3::from_rotation_x(-tilt_x_rad);
+    let turned = turn * point.extend(1.0);
+    let axis = turn.z_axis;
+    (axis.z * turned.truncate() - axis.truncate() * turned.z) / turned.z
+}
+
 impl CameraIntrinsics {
     /// Returns the pixel that sees `point` in the camera's axes (x right, y down, z forward), also outside the picture;
     /// `None` behind the camera and beyond the lens's `max_radius`.
@@ -101,11 +118,12 @@ impl CameraIntrinsics {
 mod tests {
     use super::*;
 
-    const LENSES: [Distortion; 4] = [
+    const LENSES: [Distortion; 5] = [
         Distortion::RadialTangential([-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0, 0.0, 0.0, 0.0]),
         Distortion::RadialTangential([-0.055, 0.078, 0.001, -0.002, -0.14, 0.0, 0.0, -0.141]),
         Distortion::RadialTangential([0.0; 8]),
         Distortion::Equidistant([0.0034, 0.0007, -0.0020, 0.0002]),
+        Distortion::PrismTilted([-0.28, 0.07, 2e-4, 1e-5, 0.01, 0.0, 0.0, 0.0, 5e-4, -1e-4, 2e-4, 1e-4, 1e-3, -2e-3]),
     ];
 
     #[test]

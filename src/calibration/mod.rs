@@ -10,15 +10,33 @@ mod error;
 #[cfg(feature = "files")]
 pub mod euroc;
 #[cfg(feature = "files")]
+pub mod formats;
+#[cfg(feature = "files")]
+mod ini;
+#[cfg(feature = "files")]
 mod kalibr;
 pub mod lens;
 pub mod map;
 #[cfg(feature = "files")]
+mod oak;
+#[cfg(feature = "files")]
 mod opencv;
+#[cfg(feature = "files")]
+mod orbslam;
 pub mod rectification;
 pub mod rectifier;
 #[cfg(feature = "files")]
+mod ros;
+#[cfg(feature = "files")]
+mod stored;
+#[cfg(feature = "files")]
+mod tree;
+#[cfg(feature = "files")]
+mod xml;
+#[cfg(feature = "files")]
 mod yaml;
+#[cfg(feature = "files")]
+mod zed;
 
 #[cfg(feature = "files")]
 use std::path::{Path, PathBuf};
@@ -33,6 +51,9 @@ use rectification::Rectification;
 pub enum Distortion {
     /// OpenCV's model, in its order: k1 k2 p1 p2 k3 k4 k5 k6 (radial, tangential, rational; unused ones are 0).
     RadialTangential([f64; 8]),
+    /// OpenCV's model with a thin prism and a tilted sensor: the eight of [`Self::RadialTangential`], then s1 s2 s3 s4,
+    /// and the tilts about x and y in radians, at most 0.5.
+    PrismTilted([f64; 14]),
     /// Kannala and Brandt's fisheye: the angle to the axis becomes `t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9`.
     Equidistant([f64; 4]),
 }
@@ -61,54 +82,105 @@ pub struct StereoCalibration {
     pub translation_m: DVec3,
     /// The rectification that the file contains; `None` to compute it.
     pub stored_rectification: Option<Rectification>,
-    /// Whether the translation, which has no unit in the file, was longer than 2, so that millimetres are assumed.
-    pub assumed_mm: bool,
+    /// The origin of the translation's unit.
+    pub unit: LengthUnit,
+}
+
+/// The origin of the unit of a translation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LengthUnit {
+    /// The format or the user states it.
+    Stated,
+    /// Metres, assumed.
+    AssumedMetres,
+    /// Millimetres, assumed: no rig is [`MAX_BASELINE_M`] wide.
+    AssumedMillimetres,
+}
+
+/// A longer translation without a unit is in millimetres.
+const MAX_BASELINE_M: f64 = 2.0;
+/// Baselines that are plausible for a translation without a unit, taken as metres.
+const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.005..=0.5;
+/// Minimum plausible baseline for a translation without a unit, taken as millimetres: a shorter one is rather in
+/// centimetres or in squares of the chessboard.
+const MIN_PLAUSIBLE_MM: f64 = 20.0;
+
+impl LengthUnit {
+    /// Returns the unit to assume for a translation of this length.
+    fn assume(length: f64) -> Self {
+        if length > MAX_BASELINE_M { Self::AssumedMillimetres } else { Self::AssumedMetres }
+    }
+
+    /// Returns the unit in metres.
+    fn metres(self) -> f64 {
+        if self == Self::AssumedMillimetres { 1e-3 } else { 1.0 }
+    }
 }
 
 /// Relative difference up to which aspects count as equal: sizes are in whole pixels.
 const ASPECT_TOLERANCE: f64 = 0.01;
 
-/// Reads a calibration, whose format is recognised by content: OpenCV's FileStorage YAML (one file or two; of
-/// `intrinsics.yml` and `extrinsics.yml` one suffices if the other is beside it), Kalibr's camchain, or EuRoC's
-/// `sensor.yaml` of the left and of the right camera.
+/// Reads a calibration like [`load_calibration_for`], for pictures of unknown size: from a file for several sizes, the
+/// largest.
+///
+/// # Errors
+/// Fails like [`load_calibration_for`].
+#[cfg(feature = "files")]
+pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
+    load_calibration_for(paths, None)
+}
+
+/// Reads a calibration for pictures of `size` (columns, rows). The content decides which of the [`formats::FORMATS`] it
+/// is. Where one has two files, one suffices if the other is beside it: `intrinsics.yml` and `extrinsics.yml`, or
+/// `left.yaml` and `right.yaml` of ROS.
 ///
 /// # Errors
 /// Fails if a file is unreadable, of unknown format, or lacks a key, or if numbers are invalid.
 #[cfg(feature = "files")]
-pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
+pub fn load_calibration_for(paths: &[&Path], size: Option<(u32, u32)>) -> Result<StereoCalibration, CalibrationError> {
     if !(1..=2).contains(&paths.len()) {
         return Err(CalibrationError::Files(paths.len()));
     }
     let mut files = Vec::with_capacity(2);
     for path in paths {
-        files.push(yaml::File::open(path)?);
+        files.push(tree::File::open(path)?);
     }
     let has = |key| files[0].root().get(key).is_some();
+    let one_camera = |format| Err(CalibrationError::OneCamera { path: paths[0].to_owned(), format });
     match files.as_slice() {
         [left, right] if has("T_BS") => return euroc::from_files(left, right),
-        [only] if has("T_BS") => return Err(CalibrationError::OneSensor(only.path().to_owned())),
+        [_] if has("T_BS") => return one_camera("sensor.yaml"),
         [chain, ..] if has("cam0") || has("cam1") => return kalibr::from_file(chain),
+        [conf, ..] if zed::is_conf(conf) => return zed::from_file(conf, size),
+        [json, ..] if has("cameraData") => return oak::from_file(json),
+        [one, other] if ros::is_camera_info(one) => return ros::from_files(one, other),
+        [one] if ros::is_camera_info(one) => {
+            return match find_companion_file(paths[0], ["left", "right"]) {
+                Some(other) => ros::from_files(one, &tree::File::open(&other)?),
+                None => one_camera("camera_info"),
+            };
+        }
         _ => {}
     }
     if !opencv::is_opencv(&files) {
-        return Err(CalibrationError::Unknown(paths[0].to_owned()));
+        return match files.iter().find(|file| orbslam::is_settings(file)) {
+            Some(settings) => orbslam::from_file(settings),
+            None => Err(CalibrationError::unknown_format(paths[0])),
+        };
     }
-    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), find_companion_file(paths[0])) {
-        files.push(yaml::File::open(&other)?);
+    let companion = find_companion_file(paths[0], ["intrinsic", "extrinsic"]);
+    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), companion) {
+        files.push(tree::File::open(&other)?);
     }
     opencv::from_files(&files)
 }
 
+/// Returns the file beside `path` with the second word for the first in its name, or the other way round, if it exists.
 #[cfg(feature = "files")]
-/// Returns the file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if it exists.
-fn find_companion_file(path: &Path) -> Option<PathBuf> {
+fn find_companion_file(path: &Path, [one, other]: [&str; 2]) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
-    let other = if name.contains("intrinsic") {
-        name.replace("intrinsic", "extrinsic")
-    } else {
-        name.replace("extrinsic", "intrinsic")
-    };
-    Some(path.with_file_name(&other)).filter(|other| other != path && other.is_file())
+    let companion = if name.contains(one) { name.replace(one, other) } else { name.replace(other, one) };
+    Some(path.with_file_name(&companion)).filter(|companion| companion != path && companion.is_file())
 }
 
 impl StereoCalibration {
@@ -128,6 +200,15 @@ impl StereoCalibration {
         self.translation_m.length()
     }
 
+    /// Returns the same rig with this distance between the cameras, in metres, > 0; all depth scales with it.
+    #[must_use]
+    pub fn with_baseline_m(&self, baseline_m: f64) -> Self {
+        let scale = baseline_m / self.baseline_m();
+        let stored_rectification =
+            self.stored_rectification.map(|given| Rectification { baseline_m: given.baseline_m * scale, ..given });
+        Self { translation_m: self.translation_m * scale, stored_rectification, unit: LengthUnit::Stated, ..*self }
+    }
+
     /// Whether the left camera is on the right.
     pub fn is_swapped(&self) -> bool {
         self.half_rotated_translation_m().x > 0.0
@@ -143,7 +224,7 @@ impl StereoCalibration {
             rotation,
             translation_m: -(rotation * self.translation_m),
             stored_rectification: self.stored_rectification.map(|given| given.with_swapped_cameras()),
-            assumed_mm: self.assumed_mm,
+            unit: self.unit,
         }
     }
 
@@ -170,14 +251,36 @@ impl StereoCalibration {
         Ok(scaled)
     }
 
+    /// Whether the unit is stated, or the one assumed gives a usual baseline.
+    fn is_plausible(&self) -> bool {
+        let baseline_m = self.baseline_m();
+        match self.unit {
+            LengthUnit::Stated => true,
+            LengthUnit::AssumedMetres => PLAUSIBLE_M.contains(&baseline_m),
+            LengthUnit::AssumedMillimetres => baseline_m <= *PLAUSIBLE_M.end() && baseline_m * 1e3 >= MIN_PLAUSIBLE_MM,
+        }
+    }
+
+    /// Returns a warning for the user, in one line, if the assumed unit gives an unusual baseline.
+    pub fn describe_doubt(&self) -> Option<String> {
+        let unit = if self.unit == LengthUnit::AssumedMetres { "metres" } else { "millimetres" };
+        let baseline_mm = self.baseline_m() * 1e3;
+        (!self.is_plausible()).then(|| {
+            format!(
+                "the calibration states no unit, and in {unit} its baseline of {baseline_mm:.1} mm is implausible (it \
+                 may be in centimetres, or in squares of the chessboard): measure the distance between the lenses, and \
+                 give it with --baseline-m"
+            )
+        })
+    }
+
     /// Returns the assumptions made for pictures of `size` (columns, rows), one line each for the user.
     pub fn describe_assumptions(&self, size: (u32, u32)) -> Vec<String> {
         let mut notes = Vec::new();
-        if self.assumed_mm {
-            let baseline_m = self.baseline_m();
+        if self.unit == LengthUnit::AssumedMillimetres && self.is_plausible() {
+            let baseline_mm = self.baseline_m() * 1e3;
             notes.push(format!(
-                "the calibration states no unit; assuming millimetres: a baseline of {baseline_m:.3} \
-                                m"
+                "the calibration states no unit; assuming millimetres: a baseline of {baseline_mm:.1} mm"
             ));
         }
         let (width, height) = size;

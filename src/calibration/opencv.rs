@@ -1,15 +1,14 @@
-//! Reads OpenCV's FileStorage YAML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2 R T),
-//! the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two.
+//! Reads OpenCV's FileStorage, YAML or XML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2
+//! D2 R T), the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two. ORB_SLAM2's settings have the
+//! same entries by other names (LEFT.K, RIGHT.P).
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec3;
 
 use super::error::{CalibrationError, Fault};
 use super::rectification::Rectification;
-use super::yaml::{File, Value};
-use super::{CameraIntrinsics, StereoCalibration, entries};
+use super::tree::{File, Value};
+use super::{CameraIntrinsics, LengthUnit, StereoCalibration, entries, stored};
 
-/// A longer baseline must be in millimetres: no rig is that many metres wide.
-const MAX_BASELINE_M: f64 = 2.0;
 /// Largest difference between the rectification and the pose: of elements of the rotation, and of the translation
 /// relative to its length.
 const POSE_TOLERANCE: f64 = 0.02;
@@ -20,15 +19,24 @@ const LENS_HINT: &str = "write the lens's coefficients, zeros where the pictures
 /// Remedy for a missing pose.
 const POSE_HINT: &str = "name the file with R and T, or R1 R2 P1 P2 (extrinsics.yml), as well";
 
-/// Alternative names of an entry, in lower case and without underscores.
+/// Alternative names of an entry, in lower case and without punctuation.
 type Names = &'static [&'static str];
 
 const CAMERAS: [Names; 2] = [
-    &["m1", "k1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "mleft"],
-    &["m2", "k2", "cameramatrix2", "cameramatrixright", "rightcameramatrix", "kright", "mright"],
+    &["m1", "k1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "mleft", "leftk"],
+    &["m2", "k2", "cameramatrix2", "cameramatrixright", "rightcameramatrix", "kright", "mright", "rightk"],
 ];
 const LENSES: [Names; 2] = [
-    &["d1", "distcoeffs1", "distcoeffsleft", "leftdistcoeffs", "distortioncoefficientsleft", "distortionleft", "dleft"],
+    &[
+        "d1",
+        "distcoeffs1",
+        "distcoeffsleft",
+        "leftdistcoeffs",
+        "distortioncoefficientsleft",
+        "distortionleft",
+        "dleft",
+        "leftd",
+    ],
     &[
         "d2",
         "distcoeffs2",
@@ -37,20 +45,23 @@ const LENSES: [Names; 2] = [
         "distortioncoefficientsright",
         "distortionright",
         "dright",
+        "rightd",
     ],
 ];
 const ROTATION: Names = &["r", "rotation", "rotationmatrix"];
 const TRANSLATION: Names = &["t", "translation", "translationvector"];
 /// R1 and R2, which rotate from each camera's axes to the rectified ones.
-const ROTATIONS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
-const PROJECTIONS: [Names; 2] = [&["p1", "projectionleft", "pleft"], &["p2", "projectionright", "pright"]];
+const ROTATIONS: [Names; 2] =
+    [&["r1", "rectificationleft", "rleft", "leftr"], &["r2", "rectificationright", "rright", "rightr"]];
+const PROJECTIONS: [Names; 2] =
+    [&["p1", "projectionleft", "pleft", "leftp"], &["p2", "projectionright", "pright", "rightp"]];
 const MODEL: Names = &["distortionmodel"];
 const SIZE: Names = &["imagesize", "size"];
-const WIDTH: Names = &["imagewidth", "width"];
-const HEIGHT: Names = &["imageheight", "height"];
+const WIDTH: Names = &["imagewidth", "width", "leftwidth"];
+const HEIGHT: Names = &["imageheight", "height", "leftheight"];
 
 fn find_entry<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
-    let matches_key = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-'], "").as_str());
+    let matches_key = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-', '.'], "").as_str());
     files.iter().find_map(|file| file.root().find(matches_key))
 }
 
@@ -83,18 +94,14 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
     let cameras = [read_camera(files, 0, size)?, read_camera(files, 1, size)?];
     let mut given = read_rectification(files)?;
     let (rotation, translation) = match given {
-        Some((ref given, shift)) if find_entry(files, ROTATION).is_none() => {
-            // From the left camera to the rectified axes, and on to the right camera.
-            let rectified_to_right = given.rotations[1].transpose();
-            (rectified_to_right * given.rotations[0], rectified_to_right * DVec3::new(shift, 0.0, 0.0))
-        }
+        Some((ref given, shift)) if find_entry(files, ROTATION).is_none() => stored::find_pose(given, shift),
         _ => {
             let rotation = require_entry(files, ROTATION, "R", POSE_HINT)?;
             let place = require_entry(files, TRANSLATION, "T", POSE_HINT)?;
             let translation = DVec3::from_array(place.parse_numbers::<3>(3, "3x1")?);
             (
                 entries::parse_rotation(rotation, &rotation.parse_numbers::<9>(3, "3x3")?)?,
-                entries::require_nonzero(place, translation)?,
+                entries::require_baseline(place, translation)?,
             )
         }
     };
@@ -108,17 +115,16 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
             return Err(value.to_error(Fault::Impossible { key: value.key(), what }));
         }
     }
-    let assumed_mm = translation.length() > MAX_BASELINE_M;
-    let unit_m = if assumed_mm { 1e-3 } else { 1.0 };
+    let unit = LengthUnit::assume(translation.length());
     if let Some((given, _)) = &mut given {
-        given.baseline_m *= unit_m;
+        given.baseline_m *= unit.metres();
     }
     Ok(StereoCalibration {
         cameras,
         rotation,
-        translation_m: translation * unit_m,
+        translation_m: translation * unit.metres(),
         stored_rectification: given.map(|(given, _)| given),
-        assumed_mm,
+        unit,
     })
 }
 
@@ -143,50 +149,13 @@ fn read_camera(files: &[File], side: usize, size: Option<(u32, u32)>) -> Result<
     })
 }
 
-/// P1 or P2, decomposed.
-struct Projection<'a> {
-    value: Value<'a>,
-    focal_px: DVec2,
-    center_px: DVec2,
-    /// The fourth column: the focal length times the position of the left camera.
-    shift: DVec2,
-}
-
-fn read_projection(files: &[File], side: usize) -> Result<Projection<'_>, CalibrationError> {
-    let value = require_entry(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
-    let [fx, _, cx, across, _, fy, cy, down, ..] = value.parse_numbers::<12>(3, "3x4")?;
-    let (focal_px, center_px) = entries::parse_pinhole(value, [fx, fy, cx, cy])?;
-    Ok(Projection { value, focal_px, center_px, shift: DVec2::new(across, down) })
-}
-
-/// Reads the rectification R1 R2 P1 P2, and the position of the left camera along the rows of the right one, in the
-/// file's unit; `None` if all four are missing.
+/// Reads R1 R2 P1 P2; `None` if all four are missing.
 fn read_rectification(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
     if ROTATIONS.into_iter().chain(PROJECTIONS).all(|names| find_entry(files, names).is_none()) {
         return Ok(None);
     }
-    let read_rotation = |side: usize| {
-        let value = require_entry(files, ROTATIONS[side], ["R1", "R2"][side], POSE_HINT)?;
-        entries::parse_rotation(value, &value.parse_numbers::<9>(3, "3x3")?)
-    };
-    let rotations: [DMat3; 2] = [read_rotation(0)?, read_rotation(1)?];
-    let [left, right] = [read_projection(files, 0)?, read_projection(files, 1)?];
-    let (focal_px, left_px, right_px) = (left.focal_px, left.center_px, right.center_px);
-    let value = right.value;
-    let impossible = |what| value.to_error(Fault::Impossible { key: value.key(), what });
-    if right.shift.y.abs() > right.shift.x.abs() {
-        return Err(CalibrationError::NotSideBySide("above"));
-    }
-    // P2's fourth column is in pixels: focal length times translation.
-    let shift = right.shift.x / focal_px.x;
-    if shift.abs() < 1e-9 {
-        return Err(impossible("puts both cameras in the same place (a baseline of 0)"));
-    }
-    if (focal_px - right.focal_px).abs().max_element() > 1e-3 * focal_px.x || (left_px.y - right_px.y).abs() > 0.01 {
-        return Err(impossible(
-            "is not the partner of P1 in a rectified pair: focal lengths and rows must be the same",
-        ));
-    }
-    let centers_px = [left_px, right_px];
-    Ok(Some((Rectification { rotations, focal_px, centers_px, baseline_m: shift.abs() }, shift)))
+    let require = |names, key| require_entry(files, names, key, POSE_HINT);
+    let rotations = [require(ROTATIONS[0], "R1")?, require(ROTATIONS[1], "R2")?];
+    let projections = [require(PROJECTIONS[0], "P1")?, require(PROJECTIONS[1], "P2")?];
+    stored::parse_rectification(rotations, projections).map(Some)
 }

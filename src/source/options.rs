@@ -142,8 +142,9 @@ pub struct Stereo {
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub rectified: bool,
-    /// Calibration of the two cameras; may be given more than once, or as a list with commas, for a calibration in two
-    /// files
+    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
+    /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list
+    /// with commas, for a calibration in two files
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", value_delimiter = ','))]
     pub calib: Vec<PathBuf>,
     /// Range of disparities to search, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of
@@ -153,8 +154,8 @@ pub struct Stereo {
     /// Focal length of a rectified pair, in pixels, with --baseline-m
     #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = parse_positive, conflicts_with = "calib"))]
     pub focal_px: Option<f32>,
-    /// Distance between the two cameras, in metres, with --focal-px
-    #[cfg_attr(feature = "clap", arg(long, value_name = "M", value_parser = parse_positive, conflicts_with = "calib"))]
+    /// Distance between the two cameras, in metres: with --focal-px, or instead of the one in --calib
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", value_parser = parse_positive))]
     pub baseline_m: Option<f32>,
     /// Column of the right principal point minus that of the left, in pixels [default: 0]
     #[cfg_attr(feature = "clap", arg(long, value_name = "PX", value_parser = in_range_parser(-10_000.0..=10_000.0),

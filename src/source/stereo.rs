@@ -50,6 +50,8 @@ impl options::Stereo {
                 Ok(Some(StereoRig { focal_px, baseline_m, doffs_px: self.doffs_px.unwrap_or(0.0), metric: true }))
             }
             (None, None) if self.doffs_px.is_none() => Ok(None),
+            // It replaces the calibration's.
+            (None, Some(_)) if self.doffs_px.is_none() && !self.calib.is_empty() => Ok(None),
             _ => Err(SourceError::Usage("the stereo geometry needs both --focal-px and --baseline-m".to_string())),
         }
     }
@@ -74,10 +76,12 @@ impl options::Stereo {
         }
         let from_file = match self.calib.is_empty() {
             true => None,
-            false => Some(match calib::read_pair_calibration(&self.calib, Path::new(source_name), size)? {
-                PairCalibration::Rectified { geometry, .. } => StereoGeometry::Rectified(geometry.rig),
-                PairCalibration::Raw(calibration) => StereoGeometry::Raw(calibration),
-            }),
+            false => {
+                Some(match calib::read_pair_calibration(&self.calib, Path::new(source_name), size, self.baseline_m)? {
+                    PairCalibration::Rectified { geometry, .. } => StereoGeometry::Rectified(geometry.rig),
+                    PairCalibration::Raw(calibration) => StereoGeometry::Raw(calibration),
+                })
+            }
         };
         match from_file.as_ref().unwrap_or(pair) {
             StereoGeometry::Rectified(rig) => Ok(Geometry::Rectified(*rig)),
@@ -88,7 +92,7 @@ impl options::Stereo {
                 } else {
                     Geometry::Raw(Box::new(Rectifier::new(calibration, size)?))
                 };
-                for note in calibration.describe_assumptions(size) {
+                for note in calibration.describe_doubt().into_iter().chain(calibration.describe_assumptions(size)) {
                     tracing::warn!("{note}");
                 }
                 Ok(stated)
@@ -129,9 +133,10 @@ pub fn open_stereo(
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
     let note = if metric { "" } else { ", assumed" };
     tracing::info!(
-        "{}: a stereo pair, {how}: focal length {focal_px:.1} px, cameras {baseline_m:.4} m apart, doffs {doffs_px:.2} \
+        "{}: a stereo pair, {how}: focal length {focal_px:.1} px, cameras {:.1} mm apart, doffs {doffs_px:.2} \
          px{note}; {disparities} disparities ({})",
         info.name,
+        baseline_m * 1e3,
         depth.describe()
     );
     let (computing, size) = (computing.clone(), info.size);

@@ -2,11 +2,13 @@
 #![allow(missing_docs)]
 
 mod files;
+mod formats;
 mod geometry;
 mod pictures;
 mod real;
+mod writers;
 
-use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, LengthUnit, StereoCalibration};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 const SIZE: (u32, u32) = (640, 480);
@@ -29,7 +31,7 @@ fn rig(distortion: Distortion, focal_px: f64, turn_deg: [f64; 3]) -> StereoCalib
         rotation: DMat3::from_quat(DQuat::from_scaled_axis(turn)),
         translation_m: DVec3::new(-0.11, 0.004, -0.006),
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     }
 }
 

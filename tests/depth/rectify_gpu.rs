@@ -7,7 +7,7 @@ use crate::on_gpu::device;
 
 use bokehcam::calibration::rectification::Rectification;
 use bokehcam::calibration::rectifier::Rectifier;
-use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, LengthUnit, StereoCalibration};
 use bokehcam::compute::Backend;
 use bokehcam::depth::stereo::gpu::rectifier::GpuRectifier;
 use bokehcam::depth::stereo::source::StereoDepth;
@@ -32,7 +32,7 @@ fn rectifier(size: (u32, u32)) -> Rectifier {
         rotation: DMat3::from_rotation_z(0.06) * DMat3::from_rotation_y(0.02),
         translation_m: DVec3::new(-0.1, 0.002, 0.001),
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     };
     let found = Rectification::from_calibration(&calibration, size).expect("such eyes can be");
     calibration.stored_rectification = Some(Rectification { focal_px: 0.7 * found.focal_px, ..found });

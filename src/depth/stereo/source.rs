@@ -203,7 +203,7 @@ mod tests {
     use glam::{DMat3, DVec2, DVec3};
 
     use super::*;
-    use crate::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
+    use crate::calibration::{CameraIntrinsics, Distortion, LengthUnit, StereoCalibration};
     use crate::depth::stereo::MatchError;
     use crate::frame::Stamp;
     use crate::optics::DepthCoc;
@@ -302,7 +302,7 @@ mod tests {
             rotation: DMat3::IDENTITY,
             translation_m: DVec3::new(-0.1, 0.0, 0.0),
             stored_rectification: None,
-            assumed_mm: false,
+            unit: LengthUnit::Stated,
         };
         let rectifier = Rectifier::new(&calibration, size).unwrap();
         let ramp: Vec<u8> = (0..64 * 48).map(|at| 40 + 3 * (at / 64) as u8).collect();

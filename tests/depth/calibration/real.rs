@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bokehcam::calibration::rectification::Rectification;
-use bokehcam::calibration::{self, StereoCalibration, euroc};
+use bokehcam::calibration::{self, LengthUnit, StereoCalibration, euroc};
 use glam::{DMat3, DVec2};
 
 fn data() -> PathBuf {
@@ -20,7 +20,7 @@ fn apart_deg(a: DMat3, b: DMat3) -> f64 {
 fn opencvs_own_rectification_is_ours() {
     let file = data().join("calib/extrinsics.yml");
     let rig = calibration::load_calibration(&[&file]).unwrap();
-    assert!(rig.is_swapped() && rig.assumed_mm);
+    assert!(rig.is_swapped() && rig.unit == LengthUnit::AssumedMillimetres);
     assert!((rig.baseline_m() - 0.09205).abs() < 1e-4, "{}", rig.baseline_m());
     let rig = rig.with_swapped_cameras();
     let given = Rectification::from_calibration(&rig, (640, 512)).unwrap();

@@ -155,6 +155,16 @@ fn metres_follow_the_geometry_however_it_is_given() {
     let said = desk.assert_written(&["--calib", "double.txt", "--metres", "--out", "z.pfm", "--force"]);
     assert!(said.contains("double.txt is for pictures of 320x128: scaled to 160x64"), "{said}");
     assert!((median(&read_depth(&desk.path("z.pfm"), 5000.0, None).unwrap().metres) - 1.0).abs() < 0.05);
+    // Another baseline scales all depth.
+    for (calib, baseline_m) in [("middlebury.txt", "0.05"), ("kitti.txt", "0.2"), ("double.txt", "0.3")] {
+        let more = ["--baseline-m", baseline_m, "--metres", "--out", "z.pfm", "--force"];
+        let said = desk.assert_written(&[&["--calib", calib][..], &more].concat());
+        let wanted_m: f32 = baseline_m.parse().unwrap();
+        let mm = format!("note: the cameras are {:.1} mm apart (--baseline-m)", wanted_m * 1e3);
+        assert!(said.contains(&mm), "{said}");
+        let metres = median(&read_depth(&desk.path("z.pfm"), 5000.0, None).unwrap().metres);
+        assert!((metres - 10.0 * wanted_m).abs() < 0.5 * wanted_m, "{calib}, {baseline_m} m: {metres} m");
+    }
     // Depths beyond a PNG's range are reported.
     let said = desk.assert_written(&["--focal-px", "2000", "--baseline-m", "9", "--metres", "--out", "far.png"]);
     assert!(said.contains("beyond 13.1 m"), "{said}");
@@ -196,13 +206,14 @@ fn the_range_is_rounded_up_and_fits_the_pictures() {
 #[test]
 fn what_does_not_fit_is_refused_in_one_line() {
     let desk = Desk::new();
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
         (&[], "--out"),
         (&["--out", "d.jpg"], "--out FILE ends with .pfm or .png"),
         (&["--out", "d.pfm", "--preview", "d.gif"], "--preview FILE.png"),
         (&["--out", "d.png", "--preview", "d.png"], "name the same file"),
         (&["--out", "d.pfm", "--metres"], "--metres needs the stereo geometry: give --calib FILE"),
         (&["--out", "d.pfm", "--focal-px", "700"], "--baseline-m"),
+        (&["--out", "d.pfm", "--baseline-m", "0.1"], "--baseline-m needs --focal-px, or --calib FILE"),
         (&["--out", "d.pfm", "--focal-px", "0", "--baseline-m", "1"], "above 0"),
         (&["--out", "d.pfm", "--calib", "c.txt", "--focal-px", "7", "--baseline-m", "1"], "cannot be used with"),
     ];
@@ -215,7 +226,7 @@ fn what_does_not_fit_is_refused_in_one_line() {
         ("cam0=[100 0 80; 0 100 32; 0 0 1]\ndoffs=0\nbaseline=0\n", "c.txt:3: the baseline is 0"),
         ("P0: 1 2 3\nP1: 4\n", "c.txt:1: P0: \"1 2 3\" is not a projection"),
         ("P2: 100 0 80 0 0 100 32 0 0 0 1 0\n", "c.txt: the key P0 is missing"),
-        ("hello\n", "c.txt: neither a Middlebury calibration"),
+        ("hello\n", "c.txt: not a stereo calibration that is read; the formats are OpenCV"),
         (
             "cam0=[100 0 80; 0 100 32; 0 0 1]\ndoffs=0\nbaseline=9\nwidth=160\nheight=80\n",
             "c.txt: made for pictures of 160x80, but these are 160x64",

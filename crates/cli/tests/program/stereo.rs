@@ -220,6 +220,15 @@ fn a_calibration_that_cannot_be_read_is_named() {
     with(100).refused(1, &["swap"]);
     let good = with(-100);
     assert!(good.done().contains("assuming millimetres"), "{}", good.stderr);
+    // Centimetres, and squares of the chessboard.
+    for length in [-6, -1] {
+        let doubted = with(length);
+        assert!(
+            doubted.done().contains("implausible") && doubted.stderr.contains("--baseline-m"),
+            "{}",
+            doubted.stderr
+        );
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::calibration::rectifier::Rectifier;
-use bokehcam::calibration::{CameraIntrinsics, Distortion, StereoCalibration};
+use bokehcam::calibration::{CameraIntrinsics, Distortion, LengthUnit, StereoCalibration};
 use bokehcam::compute::Backend;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::matting::Matting;
@@ -130,7 +130,7 @@ fn rectification() {
         rotation: DMat3::from_rotation_z(0.01),
         translation_m: DVec3::new(-0.06, 0.0, 0.001),
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     };
     let rectifier = Rectifier::new(&calibration, (160, 120)).unwrap();
     let left = noise(160, 120);
@@ -218,7 +218,7 @@ fn two_eyes() {
         rotation: DMat3::IDENTITY,
         translation_m: DVec3::new(-0.1, 0.0, 0.0),
         stored_rectification: None,
-        assumed_mm: false,
+        unit: LengthUnit::Stated,
     };
     let rectifier = Rectifier::new(&calibration, size).expect("maps");
     let settings = stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 };

@@ -56,18 +56,17 @@ pub struct DepthCommand {
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
           value_parser = value_parser!(u32).range(1..=i64::from(Settings::MAX_DISPARITIES)))]
     max_disparity: Option<u32>,
-    /// Calibration of the two cameras: from OpenCV, Kalibr or EuRoC, to rectify the pictures first, or the calib.txt of
-    /// a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with commas, for a
-    /// calibration in two files
+    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
+    /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list
+    /// with commas, for a calibration in two files
     #[arg(id = "pair_calib", long = "calib", value_name = "FILE", value_delimiter = ',')]
     calib: Vec<PathBuf>,
     /// Focal length in pixels, with --baseline-m
     #[arg(id = "pair_focal_px", long = "focal-px", value_name = "PX", value_parser = parse_positive,
           conflicts_with = "pair_calib", requires = "pair_baseline_m")]
     focal_px: Option<f32>,
-    /// Distance between the cameras in metres, with --focal-px
-    #[arg(id = "pair_baseline_m", long = "baseline-m", value_name = "M", value_parser = parse_positive,
-          conflicts_with = "pair_calib", requires = "pair_focal_px")]
+    /// Distance between the cameras in metres: with --focal-px, or instead of the one in --calib
+    #[arg(id = "pair_baseline_m", long = "baseline-m", value_name = "M", value_parser = parse_positive)]
     baseline_m: Option<f32>,
     /// Column of the right principal point minus that of the left, in pixels [default: 0]
     #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = in_range_parser(-10_000.0..=10_000.0),
@@ -182,6 +181,9 @@ impl DepthCommand {
         if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
             return usage("--metres needs the stereo geometry: give --calib FILE, or --focal-px and --baseline-m");
         }
+        if self.baseline_m.is_some() && self.calib.is_empty() && self.focal_px.is_none() {
+            return usage("--baseline-m needs --focal-px, or --calib FILE whose baseline it replaces");
+        }
         if still::map_format(&self.out).is_err() {
             return usage("--out FILE ends with .pfm or .png");
         }
@@ -212,8 +214,12 @@ impl DepthCommand {
             let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };
             return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(from_rig), None));
         }
-        match calib::read_pair_calibration(&self.calib, &self.left, size)? {
+        let calibration = calib::read_pair_calibration(&self.calib, &self.left, size, self.baseline_m)?;
+        let origin = if self.baseline_m.is_some() { "--baseline-m" } else { "by the calibration" };
+        let baseline = format!("the cameras are {:.1} mm apart ({origin})", calibration.baseline_m() * 1e3);
+        match calibration {
             PairCalibration::Rectified { geometry, made_for } => {
+                note(baseline);
                 if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
                     let file = self.calib[0].display();
                     note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
@@ -222,6 +228,8 @@ impl DepthCommand {
             }
             PairCalibration::Raw(calibration) => {
                 let rectifier = Rectifier::new(&calibration, size)?;
+                note(baseline);
+                calibration.describe_doubt().iter().for_each(|doubt| log::warn(doubt));
                 calibration.describe_assumptions(size).into_iter().for_each(note);
                 Ok((Some(from_rig(rectifier.rig())), Some(rectifier)))
             }

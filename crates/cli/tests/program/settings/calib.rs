@@ -46,6 +46,7 @@ fn raw_pictures_are_rectified_by_the_calibration_that_says_how() {
     let map = read_disparity(&home.path("new/disparity.pfm")).unwrap();
     let right = map.px.iter().filter(|&&px| (px - 8.0).abs() < 0.75).count();
     assert!(right * 10 > map.px.len() * 6, "{right} of {}", map.px.len());
+    assert!(ran.stderr.contains("the cameras are 100.0 mm apart (by the calibration)"), "{}", ran.stderr);
     // Depth in metres from the same file: 200 px * 0.1 m / 8 px.
     home.run(&[&args[..], &["--metres", "--out", "depth.pfm"]].concat()).done();
 }
@@ -65,6 +66,9 @@ fn a_rectified_pair_of_streams_takes_the_same_calibration_as_one_of_pictures() {
     home.run(&["depth", "left.png", "right.png", "--calib", "calib.txt", "--out", "d.pfm", "--backend", "cpu"]).done();
     let stream = ["stream", "pair", "--calib", "calib.txt", "--to", "null", "--backend", "cpu", "--focus", "2.5"];
     assert_eq!(home.run(&stream).warning(), "");
+    let stated = [&stream[..], &["--baseline-m", "0.2", "-v"]].concat();
+    let ran = home.run(&stated);
+    assert!(ran.done().contains("cameras 200.0 mm apart"), "{}", ran.stderr);
 }
 
 #[test]
@@ -78,7 +82,7 @@ fn a_calibration_of_neither_kind_is_named() {
         home.run(&["depth", "left.png", "right.png", "--calib", calib, "--out", "d.pfm", "--backend", "cpu"])
     };
     depth("bad.yml").refused(1, &["bad.yml", "YAML"]);
-    depth("notes.txt").refused(1, &["notes.txt: neither"]);
+    depth("notes.txt").refused(1, &["notes.txt: not a stereo calibration"]);
     depth("gone.yml").refused(1, &["gone.yml"]);
     assert!(!home.path("d.pfm").exists());
 }
