@@ -32,6 +32,12 @@ pub fn store<S: Simd>(values: &mut [f32], at: usize, vector: S::f32s) {
     S::as_mut_simd_f32s(&mut values[at..at + S::F32_LANES]).0[0] = vector;
 }
 
+/// Returns the absolute values. [`Simd::abs_f32s`] calls a function for every vector, which the compiler does not inline.
+#[inline(always)]
+pub fn abs<S: Simd>(simd: S, values: S::f32s) -> S::f32s {
+    simd.max_f32s(values, simd.sub_f32s(simd.splat_f32s(0.0), values))
+}
+
 /// Returns the name of the instruction set, for the report.
 pub fn instruction_set(arch: Arch) -> &'static str {
     match arch {

@@ -62,7 +62,30 @@ impl Matte {
 
     /// Returns the mixed pixels among the pixels `range`.
     pub fn pixels_in(&self, range: Range<usize>) -> &[MixedPixel] {
-        let until = |end: usize| self.pixels.partition_point(|pixel| (pixel.at as usize) < end);
-        &self.pixels[until(range.start)..until(range.end)]
+        let until = |pixels: &[MixedPixel], end: usize| pixels.partition_point(|pixel| (pixel.at as usize) < end);
+        let from_start = &self.pixels[until(&self.pixels, range.start)..];
+        // No more than the range has: so the second search is a short one, in memory that was just read.
+        let most = &from_start[..from_start.len().min(range.len())];
+        &most[..until(most, range.end)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pixels_of_a_range_are_all_within_it() {
+        let pixel = |at| MixedPixel { at, ..MixedPixel::default() };
+        for places in
+            [vec![], vec![7], vec![0, 1, 2, 3, 9, 10, 11, 40], (0..50).collect(), (0..50).step_by(7).collect()]
+        {
+            let matte = Matte { pixels: places.iter().copied().map(pixel).collect() };
+            for (start, end) in (0..52).flat_map(|start| (start..54).map(move |end| (start, end))) {
+                let found: Vec<u32> = matte.pixels_in(start..end).iter().map(|pixel| pixel.at).collect();
+                let expected = places.iter().copied().filter(|&at| (start..end).contains(&(at as usize)));
+                assert_eq!(found, expected.collect::<Vec<u32>>(), "{start}..{end} of {places:?}");
+            }
+        }
     }
 }

@@ -16,7 +16,7 @@ use super::silhouettes::Proximity;
 use crate::bokeh::occlusion::{FADE_FRACTION, MARGIN_PX, MIN_OWN_COVERAGE};
 use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS};
 use crate::compute::aligned::CacheAligned;
-use crate::compute::simd::{fma, load, store};
+use crate::compute::simd::{abs, fma, load, store};
 
 /// Relative CoC distance below which a bin belongs to a pixel's own surface: slightly less than where its weight starts
 /// to fall, so that rounding does not matter.
@@ -266,7 +266,7 @@ impl Layers {
     ) -> ([S::f32s; 3], S::m32s) {
         let (zero, one, two) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(2.0));
         let mut stack = LayerStack::new(simd);
-        let inverse = simd.div_f32s(one, simd.add_f32s(simd.abs_f32s(coc_px), one));
+        let inverse = simd.div_f32s(one, simd.add_f32s(abs(simd, coc_px), one));
         let slack = simd.min_f32s(simd.max_f32s(simd.neg_f32s(coc_px), zero), simd.splat_f32s(0.5));
         for (planes, &(low_px, high_px)) in self.planes[..self.count].iter().zip(&self.ranges_px) {
             let mut layer = load_layer(simd, planes, x);

@@ -11,7 +11,7 @@ use super::tiles::BLOCK;
 use super::unpack::{PixelRun, Surfaces};
 use crate::bokeh::plan::{BinWeight, HIDING_WEIGHT};
 use crate::compute::aligned::CacheAligned;
-use crate::compute::simd::{fma, load, store};
+use crate::compute::simd::{abs, fma, load, store};
 
 /// Columns on both sides of a block that its averages include.
 pub const MARGIN: usize = 16;
@@ -143,7 +143,7 @@ fn scale_surface<S: Simd>(
     for p in 0..3 {
         values[p] = simd.mul_f32s(weight, load::<S>(&pixels.0[p], x));
     }
-    values[4] = simd.mul_f32s(weight, simd.abs_f32s(load::<S>(&pixels.0[3], x)));
+    values[4] = simd.mul_f32s(weight, abs(simd, load::<S>(&pixels.0[3], x)));
     values
 }
 

@@ -117,9 +117,9 @@ struct ComputeMatte<'a> {
 
 impl pulp::WithSimd for ComputeMatte<'_> {
     type Output = ();
-    // No explicit vectors: the dispatch compiles these loops for the processor's instruction set.
+    // Few explicit vectors: the dispatch compiles these loops for the processor's instruction set.
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { matting, mask, color, backdrop, map } = self;
         let (width, height) = (color.width as usize, color.height as usize);
         let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(MIN_CELL_PX);
@@ -135,7 +135,8 @@ impl pulp::WithSimd for ComputeMatte<'_> {
         for at in 0..across * down {
             let is_beside = || cells[at] == Cell::Band || view.cells_within(at, 1).any(|at| cells[at] == Cell::Band);
             let place = (at / across, at % across);
-            contrasts.push(if needed[at] && is_beside() { view.compute_contrast(kernel, sums, place) } else { None });
+            let is_used = needed[at] && is_beside();
+            contrasts.push(if is_used { view.compute_contrast(simd, (kernel, sums), place) } else { None });
         }
         alphas.resize(width * height, 0.0);
         front.clear();
