@@ -3,6 +3,8 @@
 //! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
 //! `euroc` and `middlebury` can be read, and are stereo.
 
+#[doc(hidden)]
+pub mod embedded;
 pub mod geometry;
 pub mod snapshot;
 pub mod still;
