@@ -191,7 +191,9 @@ pub enum PictureFault {
     )]
     NotDepth(&'static str),
     /// The photo claims to have depth inside, which cannot be read; the photo itself may be fine.
-    #[error("the depth inside ({kind}) cannot be read: {what}; use the file as the phone saved it, or give a depth map")]
+    #[error(
+        "the depth inside ({kind}) cannot be read: {what}; use the file as the phone saved it, or give a depth map"
+    )]
     EmbeddedDepth {
         /// The kind of container, such as `GDepth`.
         kind: &'static str,

@@ -1,5 +1,6 @@
 //! Recordings and single pictures: a written file is read back, and faults are reported.
 
+mod embedded;
 mod euroc;
 mod faults;
 mod kitti;

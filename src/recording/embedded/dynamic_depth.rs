@@ -11,7 +11,8 @@ use super::{EmbeddedDepth, Found, Meaning, is_complete, is_picture};
 pub(super) const KIND: &str = "Dynamic Depth";
 
 /// Namespaces of the list's items: that of the standard, and a later one for photos of any kind.
-const ITEMS: [&str; 2] = ["http://ns.google.com/photos/dd/1.0/item/", "http://ns.google.com/photos/1.0/container/item/"];
+const ITEMS: [&str; 2] =
+    ["http://ns.google.com/photos/dd/1.0/item/", "http://ns.google.com/photos/1.0/container/item/"];
 /// Names of the item with the sharp original.
 const ORIGINALS: [&str; 3] = ["android/original_image", "android/original", "Original"];
 

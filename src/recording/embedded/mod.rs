@@ -70,11 +70,13 @@ impl Meaning {
     /// depth gets.
     pub fn to_depth(self, v: f32) -> f32 {
         match self {
-            Self::RangeInverse { near, far } => far * near / (far - v * (far - near)),
+            // Inverse depth is linear in the value.
+            Self::RangeInverse { near, far } => 1.0 / ((1.0 - v) / near + v / far),
             Self::RangeLinear { near: min, far: max } | Self::Depth { min, max } => min + v * (max - min),
             Self::Disparity { min, max } => {
                 const MIN_NEARNESS: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
-                1.0 / (min + v * (max - min)).max(max * MIN_NEARNESS)
+                let floor = if min > 0.0 { min } else { max * MIN_NEARNESS };
+                1.0 / (min + v * (max - min)).max(floor)
             }
         }
     }
