@@ -3,6 +3,7 @@
 mod embedded;
 mod euroc;
 mod faults;
+mod formats;
 mod kitti;
 mod layout;
 mod maps;

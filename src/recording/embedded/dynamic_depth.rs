@@ -62,7 +62,7 @@ fn is_depth_map(node: &Node) -> bool {
 }
 
 impl<'a> Item<'a> {
-    /// Reads an item of the list; `None` if the element is none.
+    /// Reads an item of the list; `None` for any other element.
     fn read(node: Node<'a, '_>) -> Option<Self> {
         let property = |name| ITEMS.iter().find_map(|namespace| xmp::value(node, namespace, name));
         let bytes = |name| property(name).and_then(|text| text.trim().parse().ok()).unwrap_or(0);

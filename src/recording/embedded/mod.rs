@@ -14,9 +14,12 @@ mod multi_picture;
 mod packets;
 mod xmp;
 
+use std::path::Path;
+
 use self::packets::Packets;
 use self::xmp::Xmp;
 use super::fault::PictureFault;
+use super::{coded, file_kind, heif};
 use crate::frame::DepthMap;
 
 /// Depth found inside a photo, still encoded.
@@ -76,7 +79,7 @@ impl Meaning {
             Self::Disparity { min, max } => {
                 const MIN_NEARNESS: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
                 let floor = if min > 0.0 { min } else { max * MIN_NEARNESS };
-                1.0 / (min + v * (max - min)).max(floor)
+                (1.0 / (min + v * (max - min)).max(floor)).min(DepthMap::MAX_M)
             }
         }
     }
@@ -120,6 +123,35 @@ pub fn find(file: &[u8]) -> Result<Option<EmbeddedDepth>, PictureFault> {
         }
     }
     first_fault.map_or(Ok(None), |(kind, what)| Err(PictureFault::EmbeddedDepth { kind, what }))
+}
+
+/// Does the same as [`find`] for the file `path`, which may also be HEIC if `heif-convert` is installed. The `original` of
+/// a HEIC picture is then the picture itself, converted: reading that saves a second conversion.
+///
+/// # Errors
+/// The same as for [`find`]; or the file cannot be read or converted.
+pub fn read(path: &Path) -> Result<Option<EmbeddedDepth>, PictureFault> {
+    let (file, kind) = coded::read_whole(path)?;
+    if kind != Some(file_kind::HEIC) {
+        return find(&file);
+    }
+    of_converted(&heif::convert(path)?)
+}
+
+/// Returns the depth of a HEIC picture.
+pub(super) fn of_converted(converted: &heif::Converted) -> Result<Option<EmbeddedDepth>, PictureFault> {
+    let Some(depth) = &converted.depth else { return Ok(None) };
+    let (map, _) = coded::read_whole(depth)?;
+    let found = match find(&map)? {
+        Some(found) => found,
+        None => {
+            tracing::warn!("heif-convert leaves out the range of the depth: only the order of distances is known");
+            let meaning = Meaning::Disparity { min: 0.0, max: 1.0 };
+            EmbeddedDepth { kind: "HEIC", map, meaning, is_metric: false, focus: None, original: None }
+        }
+    };
+    let (picture, _) = coded::read_whole(&converted.picture)?;
+    Ok(Some(EmbeddedDepth { original: Some(picture).filter(|picture| is_complete(picture)), ..found }))
 }
 
 /// Returns whether a file begins as a PNG or JPEG does.

@@ -1,6 +1,7 @@
 //! The index of a Multi-Picture file: JPEGs one after the other (CIPA DC-007, section 5).
 
 use super::super::jpeg;
+use super::super::tiff_directory::TiffDirectories;
 
 /// The marker APP2.
 const APP2: u8 = 0xE2;
@@ -29,24 +30,9 @@ pub(super) fn pictures(file: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// Reads position and size of each picture from an index, which has the form of a TIFF directory.
 fn read_entries(index: &[u8]) -> Option<Vec<(usize, usize)>> {
-    let is_big_endian = match index.first_chunk()? {
-        b"MM\0*" => true,
-        b"II*\0" => false,
-        _ => return None,
-    };
-    let u16_at = |at: usize| {
-        let bytes = *index.get(at..)?.first_chunk()?;
-        Some(if is_big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
-    };
-    let u32_at = |at: usize| {
-        let bytes = *index.get(at..)?.first_chunk()?;
-        Some(if is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) } as usize)
-    };
-    // An entry of the directory: tag (2 bytes), type (2), number of bytes (4), position (4).
-    let directory = u32_at(4)?;
-    let tags = (0..usize::from(u16_at(directory)?)).map(|tag| directory + 2 + 12 * tag);
-    let list = tags.into_iter().find(|&at| u16_at(at) == Some(ENTRIES_TAG))?;
-    let (bytes, start) = (u32_at(list + 4)?, u32_at(list + 8)?);
+    let index = TiffDirectories::parse(index)?;
+    let list = index.find_tag(ENTRIES_TAG)?;
+    let (bytes, start) = (index.u32_at(list + 4)?, index.u32_at(list + 8)?);
     let entries = (0..(bytes / ENTRY_BYTES).min(MAX_PICTURES)).map(|entry| start + ENTRY_BYTES * entry);
-    Some(entries.map_while(|at| Some((u32_at(at + 8)?, u32_at(at + 4)?))).collect())
+    Some(entries.map_while(|at| Some((index.u32_at(at + 8)?, index.u32_at(at + 4)?))).collect())
 }
