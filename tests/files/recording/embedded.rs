@@ -263,3 +263,23 @@ fn a_damaged_original_is_left_out() {
     let both = with_segments(&gdepth(RANGE, map), &[main_xmp(&packet("", &format!("<Camera:DepthMap {DEPTH_MAP}/>")))]);
     assert_eq!((found(&both).kind, &found(&both).map), ("GDepth", map));
 }
+
+/// The seeds for fuzzing come from another writer: Pillow, and a script after the formats' documents.
+#[test]
+fn files_of_another_writer_are_read() {
+    let seed = |name: &str| std::fs::read(format!("fuzz/seeds/embedded_depth/{name}.jpg")).unwrap();
+    for (name, kind, meaning, is_metric, has_original) in [
+        ("gdepth", "GDepth", Meaning::RangeInverse { near: 12.5, far: 67.25 }, false, true),
+        ("dynamic", "Dynamic Depth", Meaning::RangeInverse { near: 0.7, far: 9.25 }, true, true),
+        ("apple", "Apple", Meaning::Disparity { min: 0.360596, max: 1.800781 }, false, false),
+    ] {
+        let depth = found(&seed(name));
+        assert_eq!((depth.kind, depth.meaning, depth.is_metric), (kind, meaning, is_metric));
+        assert_eq!(depth.focus, (name == "gdepth").then_some(Focus::Point { x: 0.298, y: 0.532 }));
+        let map = image::load_from_memory(&depth.map).unwrap().into_luma8();
+        let near = |value: u8, expected: u8| value.abs_diff(expected) < 8;
+        assert!(map.dimensions() == (2, 2) && near(map.as_raw()[0], 0) && near(map.as_raw()[1], 255), "{map:?}");
+        let original = depth.original.map(|original| image::load_from_memory(&original).unwrap());
+        assert_eq!(original.map(|original| (original.width(), original.height())), has_original.then_some((2, 2)));
+    }
+}
