@@ -100,6 +100,8 @@ impl Meaning {
 
 /// What a container holds, or why it cannot be read, in words.
 type Found = Result<Option<EmbeddedDepth>, String>;
+/// Looks for one kind of container in a file and its XMP.
+type Finder = fn(&[u8], &Xmp) -> Found;
 
 /// Finds the depth inside a photo, given its whole file; `None` if it claims to have none, or is no JPEG or PNG.
 ///
@@ -109,7 +111,7 @@ type Found = Result<Option<EmbeddedDepth>, String>;
 pub fn find(file: &[u8]) -> Result<Option<EmbeddedDepth>, PictureFault> {
     let packets = Packets::read(file);
     let xmp = Xmp::parse(&packets);
-    let containers: [(&str, fn(&[u8], &Xmp) -> Found); 3] = [
+    let containers: [(&str, Finder); 3] = [
         (dynamic_depth::KIND, dynamic_depth::find),
         (gdepth::KIND, |_, xmp| gdepth::find(xmp)),
         (apple::KIND, apple::find),

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::io::Cursor;
 
-use super::super::{jpeg, xmp};
+use super::super::{coded, jpeg, xmp};
 
 /// Identifier at the start of a JPEG segment with a piece of Extended XMP. After it: GUID (32 bytes), length of the whole
 /// and position of the piece (4 bytes each, big-endian), and the piece.
@@ -96,7 +96,11 @@ fn assemble(mut pieces: Vec<Piece>) -> Option<Vec<u8>> {
 /// Reads the packet of a PNG, if it comes before the pixels.
 fn read_png(file: &[u8]) -> Option<Vec<u8>> {
     let limits = png::Limits { bytes: MAX_PNG_TEXT_BYTES };
-    let reader = png::Decoder::new_with_limits(Cursor::new(file), limits).read_info().ok()?;
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(file), limits);
+    decoder.set_ignore_iccp_chunk(true);
+    let (width, height) = decoder.read_header_info().ok()?.size();
+    coded::check_size(width, height).ok()?;
+    let reader = decoder.read_info().ok()?;
     let mut chunk = reader.info().utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD)?.clone();
     chunk.decompress_text_with_limit(xmp::MAX_BYTES).ok()?;
     chunk.get_text().ok().map(String::into_bytes)
