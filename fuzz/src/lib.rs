@@ -13,7 +13,7 @@ mod texts;
 
 pub use calibrations::{calibration, depth_calibration};
 pub use camera::{mjpeg, raw_pixels};
-pub use pictures::{depth_map, picture, snapshot};
+pub use pictures::{depth_map, embedded_depth, picture, snapshot};
 pub use recordings::recording;
 pub use texts::{command_line, settings};
 
@@ -21,10 +21,11 @@ pub use texts::{command_line, settings};
 pub type Target = fn(&[u8]);
 
 /// Every target with its name, which is also that of its folder of seeds.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 11] = [
     ("calibration", calibration),
     ("command_line", command_line),
     ("depth_calibration", depth_calibration),
+    ("embedded_depth", embedded_depth),
     ("mjpeg", mjpeg),
     ("depth_map", depth_map),
     ("picture", picture),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::recording::depth_file::{self, DepthUnit, Fit, Options};
-use bokehcam::recording::{PhotoMetadata, snapshot as snapshots, still};
+use bokehcam::recording::{PhotoMetadata, embedded, snapshot as snapshots, still};
 
 use super::input::{assert_one_line, file_path, write_file};
 
@@ -34,6 +34,19 @@ pub fn picture(data: &[u8]) {
     }
     if let Err(error) = snapshots::read_settings(&path) {
         assert_one_line(error);
+    }
+}
+
+/// Finds the depth inside a photo.
+pub fn embedded_depth(data: &[u8]) {
+    match embedded::find(data) {
+        Ok(Some(found)) => {
+            assert!(found.map.len() + found.original.map_or(0, |original| original.len()) <= data.len());
+            let depths = [0.0, 0.25, 1.0].map(|v| found.meaning.to_depth(v));
+            assert!(depths.iter().all(|depth| depth.is_finite() && *depth >= 0.0), "{:?}", found.meaning);
+        }
+        Ok(None) => {}
+        Err(fault) => assert_one_line(fault),
     }
 }
 

@@ -1,21 +1,28 @@
 //! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
 //! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows. Besides the pixels,
-//! a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel.
+//! a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel; other files need
+//! [`MAX_DECODER_BYTES`].
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind, Read, Seek};
 use std::path::Path;
 
 use image::codecs::jpeg::JpegDecoder;
-use image::{ColorType, ImageDecoder, ImageError};
+use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::MAX_SIDE_PX;
 use super::fault::PictureFault;
+use super::file_kind::{self, FileKind};
+use super::heif;
 use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
 use super::samples::SampleFormat;
+use super::tiff_directory::TiffDirectories;
 use crate::files::input;
+
+/// What a message names where no picture is found.
+const PICTURES: &str = "PNG or JPEG";
 
 /// Far more than a photograph of 8192 x 8192 pixels needs.
 const MAX_JPEG_BYTES: u64 = 96 << 20;
@@ -26,19 +33,18 @@ const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
 /// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
 
-/// The supported formats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Png,
-    Jpeg,
-    Pfm,
-}
+/// Memory limit for other files with their pixels: enough for 8192 x 8192 pixels of four 16-bit channels.
+const MAX_DECODER_BYTES: u64 = 576 << 20;
+
+/// Bytes of a TIFF in which its first directory is looked for; cameras write it at the start.
+const MAX_TIFF_START_BYTES: u64 = 1 << 20;
 
 /// A picture whose header was read.
 pub(super) enum EncodedPicture<'a> {
     /// Decoded straight from disk.
     Png(Box<png::Reader<BufReader<File>>>),
-    Jpeg(Box<JpegDecoder<Cursor<&'a [u8]>>>),
+    /// Decoded at once: a JPEG or another format.
+    Whole(Box<dyn ImageDecoder + 'a>),
 }
 
 /// The position of a run of pixels: index of the first one in row-major order, and distance to the next.
@@ -49,12 +55,12 @@ pub(super) struct PixelRun {
 }
 
 impl<'a> EncodedPicture<'a> {
-    /// Opens a PNG or JPEG; `memory` receives a file that must be read completely.
+    /// Opens a PNG, JPEG, WebP, TIFF, BMP, GIF (its first frame) or, by an installed program, HEIC; `memory` receives a file that must be read completely.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
-        let (mut file, format) = open_detected(path)?;
-        let coded = match format {
-            Some(Format::Png) => Self::Png(Box::new(create_png_decoder(file)?.read_info().map_err(png_fault)?)),
-            Some(Format::Jpeg) => {
+        let (mut file, kind) = open_detected(path)?;
+        let coded = match kind {
+            Some(FileKind::Png) => Self::open_png(file)?,
+            Some(FileKind::Jpeg) => {
                 let ((width, height), _) = jpeg::read_header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
@@ -62,19 +68,29 @@ impl<'a> EncodedPicture<'a> {
                 if !jpeg::is_complete(memory) {
                     return Err(PictureFault::Truncated);
                 }
-                Self::Jpeg(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(jpeg_fault)?))
+                Self::Whole(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(decoder_fault)?))
             }
-            _ => return Err(PictureFault::Format("PNG or JPEG")),
+            Some(FileKind::Other(format)) => Self::Whole(create_decoder(file, format)?),
+            Some(file_kind::HEIC) => match open_detected(&heif::convert(path)?.picture)? {
+                // The file stays open after its folder is removed.
+                (file, Some(FileKind::Png)) => Self::open_png(file)?,
+                _ => return Err(PictureFault::Damaged("its conversion gave no PNG".into())),
+            },
+            _ => return Err(FileKind::fault(kind, PICTURES)),
         };
         let (width, height) = coded.size();
         check_size(width, height)?;
         Ok(coded)
     }
 
+    fn open_png(file: File) -> Result<Self, PictureFault> {
+        Ok(Self::Png(Box::new(create_png_decoder(file)?.read_info().map_err(png_fault)?)))
+    }
+
     pub(super) fn size(&self) -> (u32, u32) {
         match self {
             Self::Png(reader) => reader.info().size(),
-            Self::Jpeg(decoder) => decoder.dimensions(),
+            Self::Whole(decoder) => decoder.dimensions(),
         }
     }
 
@@ -84,19 +100,17 @@ impl<'a> EncodedPicture<'a> {
                 let (color, depth) = reader.output_color_type();
                 SampleFormat { channels: color.samples(), is_16bit: depth == png::BitDepth::Sixteen }
             }
-            Self::Jpeg(decoder) => {
-                SampleFormat { channels: usize::from(decoder.color_type().channel_count()), is_16bit: false }
-            }
+            Self::Whole(decoder) => sample_format(decoder.color_type()),
         }
     }
 
-    /// Decodes a picture of 8-bit RGB into `into`; a JPEG avoids the copy that [`EncodedPicture::decode_runs`] makes. The
+    /// Decodes a picture of 8-bit RGB into `into`; all but a PNG avoid the copy that [`EncodedPicture::decode_runs`] makes. The
     /// caller checks that the samples are 8-bit RGB.
     pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<PhotoMetadata, PictureFault> {
         match self {
-            Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
-                let metadata = PhotoMetadata::from_jpeg(&mut decoder);
-                decoder.read_image(into).map_err(jpeg_fault)?;
+            Self::Whole(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
+                let metadata = PhotoMetadata::from_decoder(&mut *decoder);
+                decoder.read_image(into).map_err(decoder_fault)?;
                 Ok(metadata)
             }
             other => other.decode_runs(memory, |run, row| {
@@ -111,7 +125,7 @@ impl<'a> EncodedPicture<'a> {
     }
 
     /// Decodes the picture and calls `on_run` for every run of pixels with its bytes, in the format of
-    /// [`EncodedPicture::samples`]: a row of a PNG, or a whole JPEG. `memory` is working memory.
+    /// [`EncodedPicture::samples`]: a row of a PNG, or a whole picture. `memory` is working memory.
     pub(super) fn decode_runs(
         mut self,
         memory: &mut Vec<u8>,
@@ -133,10 +147,16 @@ impl<'a> EncodedPicture<'a> {
                 let _ = reader.finish();
                 Ok(PhotoMetadata::from_png(reader.info()))
             }
-            Self::Jpeg(mut decoder) => {
-                let metadata = PhotoMetadata::from_jpeg(&mut decoder);
+            Self::Whole(mut decoder) => {
+                let metadata = PhotoMetadata::from_decoder(&mut *decoder);
+                let is_16bit = sample_format(decoder.color_type()).is_16bit;
                 memory.resize(width * height * bytes_per_pixel, 0);
-                decoder.read_image(memory).map_err(jpeg_fault)?;
+                decoder.read_image(memory).map_err(decoder_fault)?;
+                if is_16bit {
+                    // The decoder writes samples as this machine does.
+                    let samples = memory.as_chunks_mut().0;
+                    samples.iter_mut().for_each(|sample| *sample = u16::from_ne_bytes(*sample).to_be_bytes());
+                }
                 on_run(PixelRun { first: 0, step: 1 }, memory);
                 Ok(metadata)
             }
@@ -144,19 +164,23 @@ impl<'a> EncodedPicture<'a> {
     }
 }
 
-/// Reads width, height and samples of a PNG or JPEG from its header only.
+/// Reads width, height and samples of a picture from its header only.
 pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), PictureFault> {
-    let (file, format) = open_detected(path)?;
-    let (size, samples) = match format {
-        Some(Format::Png) => {
+    let (file, kind) = open_detected(path)?;
+    let (size, samples) = match kind {
+        Some(FileKind::Png) => {
             let mut decoder = create_png_decoder(file)?;
             let info = decoder.read_header_info().map_err(png_fault)?;
             // A palette is expanded to RGB.
             let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
             (info.size(), SampleFormat { channels, is_16bit: info.bit_depth == png::BitDepth::Sixteen })
         }
-        Some(Format::Jpeg) => jpeg::read_header(&mut BufReader::new(file))?,
-        _ => return Err(PictureFault::Format("PNG or JPEG")),
+        Some(FileKind::Jpeg) => jpeg::read_header(&mut BufReader::new(file))?,
+        Some(FileKind::Other(format)) => {
+            let decoder = create_decoder(file, format)?;
+            (decoder.dimensions(), sample_format(decoder.color_type()))
+        }
+        _ => return Err(FileKind::fault(kind, PICTURES)),
     };
     check_size(size.0, size.1)?;
     Ok((size, samples))
@@ -165,37 +189,79 @@ pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), Pic
 /// Reads the content of a PFM file.
 pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
     match open_detected(path)? {
-        (file, Some(Format::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
+        (file, Some(FileKind::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
         _ => Err(PictureFault::Format("grey PFM")),
     }
 }
 
 /// Reads the header of a PNG and the metadata before its pixels.
 pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
-    let (file, format) = open_detected(path)?;
-    if format != Some(Format::Png) {
+    let (file, kind) = open_detected(path)?;
+    if kind != Some(FileKind::Png) {
         return Err(PictureFault::Format("PNG"));
     }
     Ok(create_png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
 }
 
-/// Opens a regular file and detects its format by the first bytes; `None` if unsupported. The file is rewound.
-fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
-    let mut file = input::open(path).map_err(open_fault)?;
-    let mut start = [0; 8];
-    let mut length = 0;
-    while let read @ 1.. = file.read(&mut start[length..])? {
-        length += read;
+/// Reads a whole JPEG or PNG, to look for parts besides its pixels; the kind only of other files.
+pub(super) fn read_whole(path: &Path) -> Result<(Vec<u8>, Option<FileKind>), PictureFault> {
+    let (file, kind) = open_detected(path)?;
+    let mut bytes = Vec::new();
+    if matches!(kind, Some(FileKind::Jpeg | FileKind::Png)) && file.metadata()?.len() <= MAX_JPEG_BYTES {
+        read_from_start(file, MAX_JPEG_BYTES, &mut bytes)?;
     }
+    Ok((bytes, kind))
+}
+
+/// Opens a regular file and detects its kind by the first bytes; `None` if unknown. The file is rewound.
+fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> {
+    let mut file = input::open(path).map_err(open_fault)?;
+    let mut start = Vec::new();
+    (&mut file).take(file_kind::START_BYTES as u64).read_to_end(&mut start)?;
     file.rewind()?;
-    let format = match &start {
-        b"\x89PNG\r\n\x1a\n" => Format::Png,
-        [0xFF, 0xD8, 0xFF, ..] => Format::Jpeg,
-        [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => Format::Pfm,
-        _ if b"\x89PNG\r\n\x1a\n".starts_with(&start[..length]) => return Err(PictureFault::Truncated),
-        _ => return Ok((file, None)),
-    };
-    Ok((file, Some(format)))
+    match FileKind::detect(&start) {
+        None if b"\x89PNG\r\n\x1a\n".starts_with(&start) => Err(PictureFault::Truncated),
+        kind => Ok((file, kind)),
+    }
+}
+
+/// Creates a decoder of 8 or 16 bits, whose size is checked.
+fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDecoder>, PictureFault> {
+    if format == ImageFormat::Tiff && is_raw_tiff(&mut file)? {
+        return Err(FileKind::fault(Some(file_kind::RAW), PICTURES));
+    }
+    let mut reader = ImageReader::with_format(BufReader::new(file), format);
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_DECODER_BYTES);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(decoder_fault)?;
+    check_size(decoder.dimensions().0, decoder.dimensions().1)?;
+    match sample_format(decoder.color_type()).bytes_per_pixel() == usize::from(decoder.color_type().bytes_per_pixel()) {
+        true => Ok(Box::new(decoder)),
+        false => Err(PictureFault::Unsupported("floating-point samples".into())),
+    }
+}
+
+/// Returns whether a TIFF is the raw picture of a camera, whose first picture is only a small copy or is not developed.
+fn is_raw_tiff(file: &mut File) -> Result<bool, PictureFault> {
+    const SUBFILE_TYPE: u16 = 254;
+    const REDUCED: usize = 1;
+    const PHOTOMETRIC: u16 = 262;
+    const COLOR_FILTER_ARRAY: u16 = 32803;
+    const DNG_VERSION: u16 = 50706;
+    let mut start = Vec::new();
+    file.take(MAX_TIFF_START_BYTES).read_to_end(&mut start)?;
+    file.rewind()?;
+    let Some(directory) = TiffDirectories::parse(&start) else { return Ok(false) };
+    let value_at = |tag| directory.find_tag(tag).map(|at| at + 8);
+    let is_reduced = value_at(SUBFILE_TYPE).and_then(|at| directory.u32_at(at)).is_some_and(|kind| kind & REDUCED != 0);
+    let is_undeveloped = value_at(PHOTOMETRIC).and_then(|at| directory.u16_at(at)) == Some(COLOR_FILTER_ARRAY);
+    Ok(is_reduced || is_undeveloped || value_at(DNG_VERSION).is_some())
+}
+
+fn sample_format(color: ColorType) -> SampleFormat {
+    let is_16bit = matches!(color, ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16);
+    SampleFormat { channels: usize::from(color.channel_count()), is_16bit }
 }
 
 /// Returns the fault of a file that cannot be opened.
@@ -259,8 +325,9 @@ pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {
     }
 }
 
-fn jpeg_fault(error: ImageError) -> PictureFault {
+fn decoder_fault(error: ImageError) -> PictureFault {
     match error {
+        ImageError::Unsupported(error) => PictureFault::Unsupported(error.to_string().replace('\n', " ")),
         ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
         other => damaged_fault(&other),
     }

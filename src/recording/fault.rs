@@ -104,6 +104,17 @@ pub enum PictureFault {
     /// The format is not the expected one.
     #[error("not a {0} file; convert it")]
     Format(&'static str),
+    /// A known kind of file that is not read.
+    #[error("it is {kind}, which is not read; {remedy}")]
+    Foreign {
+        /// The kind of file, such as `a HEIC picture`.
+        kind: &'static str,
+        /// What to do, with a command.
+        remedy: &'static str,
+    },
+    /// A form of a known kind that is not read.
+    #[error("it has a form that is not read ({0}); convert it to PNG")]
+    Unsupported(String),
     /// The header states more pixels than are supported.
     #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
     TooLarge { width: u32, height: u32 },
@@ -209,4 +220,13 @@ pub enum PictureFault {
          inverse"
     )]
     NotDepth(&'static str),
+    /// The photo claims to have depth inside, which cannot be read; the photo itself may be fine.
+    #[error(
+        "the depth inside ({kind}) cannot be read: {what}; use the file as the phone saved it, or give a depth map"
+    )]
+    EmbeddedDepth {
+        /// The kind of container, such as `GDepth`.
+        kind: &'static str,
+        what: String,
+    },
 }

@@ -71,27 +71,42 @@ pub(super) fn insert_application_segment(file: &mut Vec<u8>, number: u8, content
     file.splice(at..at, [0xFF, 0xE0 | number, high, low].into_iter().chain(content.iter().copied()));
 }
 
+/// Returns the segments of a JPEG before its coded data: marker, position of the content in the file, and content. Ends
+/// where the file is damaged.
+pub(super) fn segments(file: &[u8]) -> impl Iterator<Item = (u8, usize, &[u8])> {
+    // Any FF may pad a marker.
+    let is_padding = |at: usize| file.get(at..at + 2) == Some(&[0xFF, 0xFF]);
+    let mut at = 2;
+    std::iter::from_fn(move || {
+        at = (at..).find(|&at| !is_padding(at))?;
+        let [0xFF, marker, high, low] = *file.get(at..)?.first_chunk()? else { return None };
+        let (start, end) = (at + 4, at + 2 + usize::from(u16::from_be_bytes([high, low])));
+        at = end;
+        // EOI or SOS.
+        let content = (!matches!(marker, 0xD9 | 0xDA)).then(|| file.get(start..end))??;
+        Some((marker, start, content))
+    })
+}
+
 /// Returns whether the segments lead to the end marker (EOI), which a truncated file lacks.
 pub(super) fn is_complete(bytes: &[u8]) -> bool {
+    find_end(bytes).is_some()
+}
+
+/// Returns the number of bytes up to the end marker (EOI), which a truncated file lacks; other data may follow it.
+pub(super) fn find_end(bytes: &[u8]) -> Option<usize> {
     const START: u8 = 0xD8;
     const END: u8 = 0xD9;
     let mut rest = bytes;
     loop {
         // Coded data has its FF bytes stuffed with 00 or is split by restart markers; FF may also pad a marker.
-        let Some(at) = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))
-        else {
-            return false;
-        };
+        let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))?;
         let (marker, after) = (rest[at + 1], &rest[at + 2..]);
         rest = match marker {
-            END => return true,
+            END => return Some(bytes.len() - after.len()),
             START | 0x01 => after,
             // Skip a segment by its length, as its content may look like markers.
-            _ => {
-                let Some(&[high, low]) = after.first_chunk() else { return false };
-                let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };
-                next
-            }
+            _ => after.get(usize::from(u16::from_be_bytes(*after.first_chunk()?))..)?,
         };
     }
 }

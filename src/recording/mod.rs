@@ -4,6 +4,8 @@
 //! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists.
 
 pub mod depth_file;
+#[doc(hidden)]
+pub mod embedded;
 pub mod geometry;
 pub mod snapshot;
 pub mod still;
@@ -17,7 +19,9 @@ mod encode;
 mod error;
 mod euroc;
 mod fault;
+mod file_kind;
 mod folder;
+mod heif;
 mod jpeg;
 mod kitti;
 mod list;
@@ -29,6 +33,7 @@ mod photo_metadata;
 pub mod pictures;
 mod rgbd;
 mod samples;
+mod tiff_directory;
 mod timeline;
 mod unit;
 mod xmp;

@@ -1,9 +1,6 @@
 //! Metadata of picture files that is copied to derived pictures.
 
-use std::io::{BufRead, Seek};
-
 use image::ImageDecoder;
-use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
 
 use super::xmp;
@@ -49,10 +46,21 @@ impl PhotoMetadata {
         metadata
     }
 
-    pub(super) fn from_jpeg<R: BufRead + Seek>(decoder: &mut JpegDecoder<R>) -> Self {
+    /// Reads the metadata of a picture before it is decoded.
+    pub(super) fn from_decoder(decoder: &mut dyn ImageDecoder) -> Self {
         // Unreadable metadata must not reject the picture.
         let exif = decoder.exif_metadata().ok().flatten();
+        // A TIFF states its orientation by itself.
+        let orientation = decoder.orientation().ok().filter(|turned| *turned != Orientation::NoTransforms);
+        let exif = exif.or_else(|| orientation.map(exif_of_orientation));
+        let color = decoder.original_color_type();
         let mut metadata = Self { exif, ..Self::default() };
+        if decoder.color_type().has_alpha() {
+            metadata.lost_properties.push("transparency");
+        }
+        if color.bits_per_pixel() / u16::from(color.channel_count()) > 8 {
+            metadata.lost_properties.push("16 bits a channel");
+        }
         metadata.set_profile(decoder.icc_profile().ok().flatten());
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
             metadata.set_xmp(Ok(packet));
@@ -117,6 +125,13 @@ impl PhotoMetadata {
         }
         self
     }
+}
+
+/// Returns EXIF with the orientation only.
+fn exif_of_orientation(orientation: Orientation) -> Vec<u8> {
+    // One entry: the tag 0x112 with one 16-bit number.
+    let entry = [0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation.to_exif(), 0, 0];
+    [&b"MM\0*\0\0\0\x08\0\x01"[..], &entry, &[0; 4]].concat()
 }
 
 /// Unlinks the thumbnail's directory (IFD1) from the chain of EXIF directories, and overwrites the thumbnail with

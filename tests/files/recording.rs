@@ -2,8 +2,10 @@
 
 mod associations;
 mod depth_files;
+mod embedded;
 mod euroc;
 mod faults;
+mod formats;
 mod kitti;
 mod kitti_scenes;
 mod layout;

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
 use bokehcam::frame::ColorImage;
+use bokehcam::recording::embedded::find;
 use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color};
 use bokehcam::recording::{Options, Recording, RecordingError};
 use bokehcam::{calibration, recording::geometry::Geometry};
@@ -113,6 +114,38 @@ fn a_picture_takes_what_its_pixels_take() {
     write_color(&path, &ColorImage::new(side_px, side_px), false).unwrap();
     let (most, _) = most_bytes(|| read_color(&path).unwrap());
     assert!(most < 4 * rgb_bytes, "{most} bytes for {rgb_bytes}");
+}
+
+/// Depth inside a photo takes what the documentation of `recording::embedded` states, whatever its packet is made of.
+#[test]
+fn depth_inside_a_photo_takes_a_few_times_the_file() {
+    let _alone = alone();
+    let name = b"http://ns.adobe.com/xmp/extension/\0";
+    let photo = |packet: &str| {
+        let mut file = b"\xff\xd8".to_vec();
+        for (index, piece) in packet.as_bytes().chunks(60_000).enumerate() {
+            let claim = [packet.len() as u32, index as u32 * 60_000].map(u32::to_be_bytes).concat();
+            let length = (2 + name.len() + 32 + claim.len() + piece.len()) as u16;
+            file.extend([b"\xff\xe1".as_slice(), &length.to_be_bytes(), name, &[b'0'; 32], &claim, piece].concat());
+        }
+        file
+    };
+    let namespace = "xmlns:GDepth='http://ns.google.com/photos/1.0/depthmap/'";
+    let map = "A".repeat(16 * MIB);
+    for (packet, is_fault) in [
+        (
+            format!("<x {namespace} GDepth:Format='RangeInverse' GDepth:Near='1' GDepth:Far='2' GDepth:Data='{map}'/>"),
+            true,
+        ),
+        (format!("<x {namespace} GDepth:Data='{}'/>", "&#65;".repeat(3 * MIB)), true),
+        (format!("<x {namespace}>{}</x>", "<a b=''/>".repeat(2 * MIB)), true),
+        (format!("<x {namespace}>{}</x>", "<a b=''/>".repeat(3000)), false),
+    ] {
+        let file = photo(&packet);
+        let (most, found) = most_bytes(|| find(&file));
+        assert!(most <= 4 * file.len() + 10 * MIB, "{most} bytes for {}", file.len());
+        assert_eq!(found.is_err(), is_fault);
+    }
 }
 
 #[test]

@@ -25,6 +25,7 @@ mod fit;
 mod fuzz;
 #[cfg(feature = "gpu")]
 mod gpu_faults;
+mod heic;
 #[cfg(feature = "networks")]
 mod networks;
 mod outputs;

@@ -1,0 +1,156 @@
+//! HEIC pictures through the program `heif-convert` (package libheif-examples), which has their decoder.
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use super::fault::PictureFault;
+use super::file_kind::{self, FileKind};
+
+const PROGRAM: &str = "heif-convert";
+/// Time after which the program counts as hung; the largest pictures take some seconds.
+const TIMEOUT: Duration = Duration::from_secs(60);
+/// How often the program is polled while waiting for it.
+const TICK: Duration = Duration::from_millis(5);
+/// The name of the converted picture. Several pictures are numbered, `picture-1.png`, and each one's depth is
+/// `picture-depth.png`.
+const PICTURE: &str = "picture.png";
+
+/// A converted picture, in a temporary folder that is removed with it.
+pub(super) struct Converted {
+    _folder: TempDir,
+    /// A PNG, upright.
+    pub(super) picture: PathBuf,
+    /// A PNG of its depth, if there is any; with XMP by newer versions of the program.
+    pub(super) depth: Option<PathBuf>,
+}
+
+/// Converts a HEIC picture, and the depth inside.
+///
+/// # Errors
+/// The program is not installed, fails or hangs, or leaves no picture.
+pub(super) fn convert(path: &Path) -> Result<Converted, PictureFault> {
+    convert_by(OsStr::new(PROGRAM), path)
+}
+
+fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
+    let folder = TempDir::with_prefix("bokehcam-")?;
+    let messages = folder.path().join("messages");
+    // An absolute path is no option, whatever its name.
+    let mut command = Command::new(program);
+    command.arg("--with-aux").arg(path.canonicalize()?).arg(folder.path().join(PICTURE));
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&messages)?);
+    let is_success = run(&mut command).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => FileKind::fault(Some(file_kind::HEIC), ""),
+        ErrorKind::TimedOut => PictureFault::Damaged(format!("{PROGRAM} hung, and was killed")),
+        _ => PictureFault::Io(error),
+    })?;
+    let files: Vec<_> = fs::read_dir(folder.path())?.flatten().map(|entry| entry.path()).collect();
+    let find = |suffixes: [&str; 2]| {
+        let ends = |path: &Path| {
+            path.file_stem()
+                .and_then(OsStr::to_str)
+                .is_some_and(|stem| suffixes.iter().any(|end| stem == format!("picture{end}")))
+        };
+        files.iter().find(|path| ends(path)).cloned()
+    };
+    match find(["", "-1"]) {
+        Some(picture) if is_success => Ok(Converted { picture, depth: find(["-depth", "-1-depth"]), _folder: folder }),
+        _ => {
+            let said = fs::read(&messages).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
+            let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it left no picture");
+            Err(PictureFault::Damaged(format!("{PROGRAM}: {}", last.trim())))
+        }
+    }
+}
+
+/// Runs a command and returns whether it succeeded; kills it if it hangs.
+fn run(command: &mut Command) -> std::io::Result<bool> {
+    let mut child = command.spawn()?;
+    let started = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(status.success());
+        }
+        if started.elapsed() > TIMEOUT {
+            child.kill()?;
+            child.wait()?;
+            return Err(ErrorKind::TimedOut.into());
+        }
+        thread::sleep(TICK);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use image::GrayImage;
+
+    use super::super::embedded::{self, Meaning};
+    use super::*;
+
+    /// Runs a script in place of the program; `$2` is the HEIC picture and `$3` the PNG to write.
+    fn convert_by_script(dir: &TempDir, script: &str) -> Result<Converted, PictureFault> {
+        let program = dir.path().join("program");
+        fs::write(&program, format!("#!/bin/sh\n[ \"$1\" = --with-aux ] && [ -f \"$2\" ] || exit 9\n{script}"))
+            .unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        convert_by(program.as_os_str(), &dir.path().join("-in.heic"))
+    }
+
+    #[test]
+    fn picture_and_depth_are_found_where_the_program_writes_them() {
+        let dir = TempDir::new().unwrap();
+        fs::write(dir.path().join("-in.heic"), "").unwrap();
+        for (name, shade) in [("picture.png", 7), ("depth.png", 200)] {
+            GrayImage::from_pixel(4, 2, [shade].into()).save(dir.path().join(name)).unwrap();
+        }
+        let copy =
+            |from: &str, to: &str| format!("cp {}/{from} \"$(dirname \"$3\")/{to}\"\n", dir.path().to_str().unwrap());
+        for (script, has_depth) in [
+            (copy("picture.png", "picture.png"), false),
+            (copy("picture.png", "picture.png") + &copy("depth.png", "picture-depth.png"), true),
+            (copy("picture.png", "picture-1.png") + &copy("depth.png", "picture-1-depth.png"), true),
+            // An auxiliary picture of another kind.
+            (copy("picture.png", "picture.png") + &copy("depth.png", "picture-urn-matte.png"), false),
+        ] {
+            let converted = convert_by_script(&dir, &script).unwrap();
+            let read = |path: &Path| image::open(path).unwrap().into_luma8().as_raw()[0];
+            assert_eq!(read(&converted.picture), 7);
+            assert_eq!(converted.depth.as_deref().map(read), has_depth.then_some(200));
+            let embedded = embedded::of_converted(&converted).unwrap();
+            assert_eq!(embedded.is_some(), has_depth);
+            if let Some(embedded) = embedded {
+                assert_eq!(embedded.meaning, Meaning::Disparity { min: 0.0, max: 1.0 });
+                assert_eq!(embedded.original, Some(fs::read(&converted.picture).unwrap()));
+            }
+            let picture = converted.picture.clone();
+            drop(converted);
+            assert!(!picture.exists());
+        }
+    }
+
+    #[test]
+    fn a_program_that_is_missing_or_fails_is_told_in_one_line() {
+        let dir = TempDir::new().unwrap();
+        fs::write(dir.path().join("-in.heic"), "").unwrap();
+        for (script, said) in [
+            ("echo first >&2; echo Could not read HEIF >&2; exit 1", "heif-convert: Could not read HEIF"),
+            ("exit 0", "it left no picture"),
+            ("echo late >&2; cp \"$2\" \"$3\"; exit 3", "late"),
+        ] {
+            let fault = convert_by_script(&dir, script).err().unwrap().to_string();
+            assert!(fault.contains(said) && !fault.contains('\n'), "{fault}");
+        }
+        let fault = convert_by(OsStr::new("no-such-program"), &dir.path().join("-in.heic")).err().unwrap().to_string();
+        assert!(fault.contains("a HEIC picture") && fault.contains("package libheif-examples"), "{fault}");
+    }
+}

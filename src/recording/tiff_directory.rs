@@ -1,0 +1,37 @@
+//! Directories of TIFF files, which EXIF and Multi-Picture files have as well (TIFF 6.0, section 2).
+
+/// The structure of a TIFF file; no position leads outside of it.
+pub(super) struct TiffDirectories<'a> {
+    file: &'a [u8],
+    is_big_endian: bool,
+}
+
+impl<'a> TiffDirectories<'a> {
+    /// Reads the header; `None` if it is another file.
+    pub(super) fn parse(file: &'a [u8]) -> Option<Self> {
+        let is_big_endian = match file.first_chunk()? {
+            b"MM\0*" => true,
+            b"II*\0" => false,
+            _ => return None,
+        };
+        Some(Self { file, is_big_endian })
+    }
+
+    pub(super) fn u16_at(&self, at: usize) -> Option<u16> {
+        let bytes = *self.file.get(at..)?.first_chunk()?;
+        Some(if self.is_big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
+    }
+
+    pub(super) fn u32_at(&self, at: usize) -> Option<usize> {
+        let bytes = *self.file.get(at..)?.first_chunk()?;
+        Some(if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) } as usize)
+    }
+
+    /// Returns the position of a tag's entry in the first directory. An entry has the tag (2 bytes), the type (2), the
+    /// number of values (4), and the values or their position (4).
+    pub(super) fn find_tag(&self, tag: u16) -> Option<usize> {
+        let directory = self.u32_at(4)?;
+        let entries = (0..usize::from(self.u16_at(directory)?)).map(|entry| directory + 2 + 12 * entry);
+        entries.into_iter().find(|&at| self.u16_at(at) == Some(tag))
+    }
+}
