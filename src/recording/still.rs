@@ -46,6 +46,14 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingE
     Ok((ColorImage { width, height, rgb: upright.into_bytes() }, metadata))
 }
 
+/// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.
+///
+/// # Errors
+/// The file is missing, not a PNG or JPEG, or too large.
+pub fn read_size(path: &Path) -> Result<(u32, u32), RecordingError> {
+    coded::read_header(path).map(|(size, _)| size).map_err(RecordingError::picture(path))
+}
+
 /// The content of a map file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Map {

@@ -1,15 +1,16 @@
 //! Photos, and the depth files next to them.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{DepthChoice, DepthOrigin, Options, Source, SourceError, SourceName};
 use crate::depth::FrameInput;
+use crate::files::input;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::optics::StereoRig;
-use crate::recording::{DepthUnit, snapshot, still, still::Map};
+use crate::recording::still::{self, Map, PhotoFormat};
+use crate::recording::{DepthUnit, snapshot};
 
 /// Suffixes of depth files, after the photo's stem. The first is that of snapshots.
 const DEPTH: [&str; 4] = ["-depth.pfm", "-depth.png", ".depth.pfm", ".depth.png"];
@@ -18,9 +19,28 @@ const COLOR: &str = "-color";
 
 /// Returns whether a file is a PNG or JPEG, by its first bytes.
 pub fn is_photo(path: &Path) -> bool {
+    read_format(path).is_some()
+}
+
+/// Returns the format of a picture by its first bytes; `None` if it is another one, or cannot be read.
+pub fn read_format(path: &Path) -> Option<PhotoFormat> {
     let mut first = [0; 8];
-    let read = File::open(path).and_then(|mut file| file.read_exact(&mut first));
-    read.is_ok() && (first == *b"\x89PNG\r\n\x1a\n" || first.starts_with(&[0xff, 0xd8, 0xff]))
+    input::open(path).ok()?.read_exact(&mut first).ok()?;
+    match first {
+        [0xff, 0xd8, 0xff, ..] => Some(PhotoFormat::Jpeg),
+        _ => (first == *b"\x89PNG\r\n\x1a\n").then_some(PhotoFormat::Png),
+    }
+}
+
+/// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth` or `NAME.depth`, of any
+/// format), or the picture of a snapshot before the blur.
+pub fn is_companion(path: &Path) -> bool {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_original = || {
+        let snapshot = stem.strip_suffix(COLOR).map(|stem| path.with_file_name(format!("{stem}.png")));
+        snapshot.is_some_and(|snapshot| snapshot::source_paths(&snapshot).0 == path && snapshot.is_file())
+    };
+    stem.ends_with("-depth") || stem.ends_with(".depth") || is_original()
 }
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.

@@ -1,8 +1,11 @@
 //! `render`: blurs a still picture.
 
+mod batch;
 mod debug;
 mod debug_pictures;
 mod input;
+mod listing;
+mod map_folder;
 
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -36,7 +39,7 @@ use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
 /// Blur one still picture
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
@@ -48,22 +51,31 @@ Examples:
   bokehcam render photo.jpg --effect blur --blur 12 --aperture heart --out hearts.png
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
   bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
+  bokehcam render shots/ --out blurred/
   bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
 pub struct RenderCommand {
-    /// The picture, PNG or JPEG [default: the original picture of the snapshot in --like]
-    #[arg(required_unless_present = "like")]
+    /// The picture, PNG or JPEG; or many of them: files, folders, or patterns such as 'shots/*.jpg'
+    /// [default: the original picture of the snapshot in --like]
+    #[arg(value_name = "IMAGE", required_unless_present = "like")]
+    images: Vec<PathBuf>,
+    /// The only picture, or that of many that this run blurs.
+    #[arg(skip)]
     image: Option<PathBuf>,
-    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity written by `depth`
+    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity written by `depth`. For many pictures a folder, with
+    /// NAME.png, NAME.pfm or NAME-depth.* for each picture NAME
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
-    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
+    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp. For many pictures a
+    /// folder, with NAME.png or NAME-mask.* for each picture NAME
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
     /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
     /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
     like: Option<PathBuf>,
-    /// File for the result, .png or .jpg
+    /// File for the result, .png or .jpg. For many pictures a folder: each result has the name and kind of its picture.
+    /// One that is already there is kept, even if it is older than its picture or has other settings, unless --force
+    /// is given
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
     /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
@@ -86,11 +98,28 @@ pub struct RenderCommand {
 ///
 /// # Errors
 /// Fails if a picture cannot be read or written, the options do not fit it, or the blur fails.
-pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
+pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
+    if listing::is_many(&command.images, &command.out) {
+        return batch::run(&command, global, given);
+    }
+    command.image = command.images.pop();
+    check_outputs(&command)?;
+    let look = build_look(&command)?;
+    create_parent_folder(&command.out)?;
+    warn_of_leftovers([command.out.as_path()]);
+    let Rendered { executor, depth_by } = render(&command, &look, given)?;
+    if !global.quiet {
+        depth_by.iter().for_each(|by| terminal::print_to_stderr(&format!("depth by {by}")));
+        terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
+    }
+    Ok(())
+}
+
+/// Refuses outputs that exist, without `--force`, or that are inputs.
+fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    let sources = input_files(command);
-    for source in &sources {
+    for source in &input_files(command) {
         refuse_overwriting_source("--out", &command.out, source)?;
         // That folder's files have fixed names, which may match a source.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
@@ -99,6 +128,11 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
             refuse_overwriting_source("--debug-dir", dir, source)?;
         }
     }
+    Ok(())
+}
+
+/// Builds the look, for depth that a picture can have.
+fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
     let elsewhere = match &command.blur.depth {
         DepthChoice::Folder(folder) => Some(folder.display().to_string()),
         DepthChoice::Device(name) => Some(name.clone()),
@@ -112,9 +146,21 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
             DepthChoice::suggest_keyword(&name)
         )));
     }
-    let look = look::build_look(&command.blur, &command.computing.quality)?;
-    let Input { color, metadata, depth, found } = read_input(command, &look)?;
-    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
+    look::build_look(&command.blur, &command.computing.quality)
+}
+
+/// How a picture was rendered.
+struct Rendered {
+    /// Description of the executor.
+    executor: String,
+    /// Origin of depth that was found in or beside the photo.
+    depth_by: Option<String>,
+}
+
+/// Blurs the command's only picture, and writes the result.
+fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<Rendered, CliError> {
+    let Input { color, metadata, depth, found } = read_input(command, look)?;
+    let look = source::adapt_look(look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &color, (depth.as_ref(), found.as_ref()), given);
@@ -126,8 +172,6 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         _ => look,
     };
     let computing = command.computing.to_compute_options();
-    create_parent_folder(&command.out)?;
-    warn_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
         None => engine::still::blur_picture(&look, color, depth, &computing)?,
@@ -138,14 +182,10 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         metadata = metadata.for_jpeg();
     }
     still::write_photo(&command.out, &result, &metadata, command.output.force)?;
-    if !global.quiet {
-        if !metadata.lost_properties.is_empty() {
-            log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
-        }
-        found.iter().for_each(|found| terminal::print_to_stderr(&format!("depth by {}", found.by)));
-        terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
+    if !metadata.lost_properties.is_empty() {
+        log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
     }
-    Ok(())
+    Ok(Rendered { executor, depth_by: found.map(|found| found.by) })
 }
 
 impl RenderCommand {
