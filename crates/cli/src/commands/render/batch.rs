@@ -207,16 +207,15 @@ fn report(pictures: &[Picture], done: &[Done], global: &Global) -> Result<(), Cl
             }
         }
     }
-    let mut counts = format!("{} pictures: {written} written, {kept} skipped", pictures.len());
-    counts += &match (kept, older) {
+    let aside = match (kept, older) {
         (0, _) => String::new(),
-        (_, 0) => " (their results are there; --force renders them again)".to_owned(),
-        _ => format!(" (their results are there, {older} older than the picture; --force renders them again)"),
+        (_, 0) => " (the result is there; --force renders it again)".to_owned(),
+        _ => format!(" (the result is there, and of {older} older than the picture; --force renders it again)"),
     };
-    counts += &format!(", {failed} failed");
+    let mut counts = format!("{written} written, {kept} skipped{aside}, {failed} failed");
     let left = pictures.len() - done.len();
     if left > 0 {
-        counts += &format!(", {left} not begun; the same command renders the rest");
+        counts += &format!(", {left} not begun: the same command renders the rest");
     }
     if left + failed > 0 {
         return Err(CliError::Incomplete(counts));

@@ -10,7 +10,7 @@ mod map_folder;
 use std::fmt::Display;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, value_parser};
 
 use input::{FoundDepth, Input, read_input};
 
@@ -38,7 +38,10 @@ use bokehcam::source::options::DepthUnit;
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
-/// Blur one still picture
+/// Largest change of a mask, in pixels.
+const MAX_MASK_PX: i64 = 200;
+
+/// Blur one still picture, or many
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -69,6 +72,15 @@ pub struct RenderCommand {
     /// folder, with NAME.png or NAME-mask.* for each picture NAME
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
+    /// Move the outline of --mask outwards by this much, in pixels of the picture; inwards if negative. Then it is
+    /// fitted to the colours of the picture, unless --refine off is given
+    #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
+          value_parser = value_parser!(i32).range(-MAX_MASK_PX..=MAX_MASK_PX))]
+    mask_grow: i32,
+    /// Turn the outline of --mask into a gradual transition, of so many pixels on both sides
+    #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
+          value_parser = value_parser!(u16).range(0..=MAX_MASK_PX))]
+    mask_feather: u16,
     /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
     /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
