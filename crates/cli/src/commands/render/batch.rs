@@ -108,7 +108,9 @@ fn refuse_overwriting_inputs(command: &RenderCommand, maps: &MapFolders, picture
     };
     for source in pictures.iter().flat_map(inputs_of) {
         paths.entry(place::resolve_links(&source)).or_insert_with(|| source.clone());
-        identity(&source).map(|file| files.entry(file).or_insert(source));
+        if let Some(file) = identity(&source) {
+            files.entry(file).or_insert(source);
+        }
     }
     for Picture { target, .. } in pictures {
         let by_file = || files.get(&identity(target)?);
