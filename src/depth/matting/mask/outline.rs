@@ -62,8 +62,9 @@ fn is_sharp(mask: &Mask) -> bool {
     let width = mask.width as usize;
     let undecided = mask.alpha.iter().filter(|alpha| UNDECIDED.contains(alpha)).count();
     let is_in = |at: usize| mask.alpha[at] > 0.5;
-    let crosses =
-        |at: usize| (at % width > 0 && is_in(at) != is_in(at - 1)) || (at >= width && is_in(at) != is_in(at - width));
+    let crosses = |at: usize| {
+        (!at.is_multiple_of(width) && is_in(at) != is_in(at - 1)) || (at >= width && is_in(at) != is_in(at - width))
+    };
     let outline = (0..mask.alpha.len()).filter(|&at| crosses(at)).count();
     outline > 0 && undecided <= SHARP_PX * outline
 }
