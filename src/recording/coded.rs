@@ -213,6 +213,11 @@ pub(super) fn read_whole(path: &Path) -> Result<(Vec<u8>, Option<FileKind>), Pic
     Ok((bytes, kind))
 }
 
+/// Returns the kind of a file by its first bytes; `None` if it is unknown or cannot be read.
+pub(super) fn read_kind(path: &Path) -> Option<FileKind> {
+    open_detected(path).ok()?.1
+}
+
 /// Opens a regular file and detects its kind by the first bytes; `None` if unknown. The file is rewound.
 fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> {
     let mut file = input::open(path).map_err(open_fault)?;

@@ -6,15 +6,16 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use image::{DynamicImage, RgbImage};
+use image::{DynamicImage, ImageFormat, RgbImage};
 
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
 use super::error::RecordingError;
 use super::fault::PictureFault;
+use super::file_kind::{self, FileKind};
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
-use super::{check_depth_scale, depth_covers, encode, pfm};
+use super::{check_depth_scale, coded, depth_covers, encode, pfm};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
@@ -44,6 +45,14 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingE
     upright.apply_orientation(metadata.take_orientation());
     let (width, height) = (upright.width(), upright.height());
     Ok((ColorImage { width, height, rgb: upright.into_bytes() }, metadata))
+}
+
+/// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.
+///
+/// # Errors
+/// The file is missing, not a PNG or JPEG, or too large.
+pub fn read_size(path: &Path) -> Result<(u32, u32), RecordingError> {
+    coded::read_header(path).map(|(size, _)| size).map_err(RecordingError::picture(path))
 }
 
 /// Checks that the depth map `path` of `depth` (columns, rows) pixels covers a picture of `color` pixels.
@@ -159,6 +168,21 @@ pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
         Some("jpg" | "jpeg") => Ok(PhotoFormat::Jpeg),
         _ => Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.jpg`"))),
     }
+}
+
+/// Returns the format that suits the result of a picture, by the first bytes of its file: JPEG for JPEG and HEIC, else
+/// PNG; `None` if it is no picture that is read.
+pub fn result_format(path: &Path) -> Option<PhotoFormat> {
+    match coded::read_kind(path)? {
+        FileKind::Jpeg | file_kind::HEIC => Some(PhotoFormat::Jpeg),
+        FileKind::Png | FileKind::Other(_) => Some(PhotoFormat::Png),
+        FileKind::Pfm | FileKind::Foreign(..) => None,
+    }
+}
+
+/// Returns whether a file is a GIF, by its first bytes.
+pub fn is_gif(path: &Path) -> bool {
+    coded::read_kind(path) == Some(FileKind::Other(ImageFormat::Gif))
 }
 
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown, as is depth beyond 65535 units; or

@@ -1,7 +1,5 @@
 //! Photos, and the depth files next to them.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::options::Depth;
@@ -19,11 +17,20 @@ const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr"
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
-/// Returns whether a file is a PNG or JPEG, by its first bytes.
+/// Returns whether a file is a photo, by its first bytes. A GIF is a video.
 pub fn is_photo(path: &Path) -> bool {
-    let mut first = [0; 8];
-    let read = File::open(path).and_then(|mut file| file.read_exact(&mut first));
-    read.is_ok() && (first == *b"\x89PNG\r\n\x1a\n" || first.starts_with(&[0xff, 0xd8, 0xff]))
+    still::result_format(path).is_some() && !still::is_gif(path)
+}
+
+/// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth` or `NAME.depth`, of any
+/// format), or the picture of a snapshot before the blur.
+pub fn is_companion(path: &Path) -> bool {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_original = || {
+        let snapshot = stem.strip_suffix(COLOR).map(|stem| path.with_file_name(format!("{stem}.png")));
+        snapshot.is_some_and(|snapshot| snapshot::source_paths(&snapshot).0 == path && snapshot.is_file())
+    };
+    stem.ends_with("-depth") || stem.ends_with(".depth") || is_original()
 }
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.

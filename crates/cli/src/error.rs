@@ -63,6 +63,9 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     OutputFailed(String),
+    /// Some of many pictures were not rendered; the reasons are printed.
+    #[error("{0}")]
+    Incomplete(String),
     /// The plate could not be taken.
     #[error("no plate: {0}")]
     NoPlate(String),

@@ -3,6 +3,7 @@
 //! All of it goes through one [`Screen`].
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
@@ -79,17 +80,41 @@ pub fn print_to_stderr(text: &str) {
 
 /// Prints a warning, unless `--quiet` is given.
 pub fn warn(what: &str) {
-    print_remark("WARN", "warning", what);
+    print_remark(Remark::Warning, what);
 }
 
 /// Prints a note on an automatic action, unless `--quiet` is given.
 pub fn note(what: &str) {
-    print_remark("INFO", "note", what);
+    print_remark(Remark::Note, what);
 }
 
-fn print_remark(level: &str, name: &str, what: &str) {
+/// A warning or a note.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Remark {
+    Warning,
+    Note,
+}
+
+thread_local! {
+    /// This thread's remarks during [`hold_remarks`].
+    static HELD: RefCell<Option<Vec<(Remark, String)>>> = const { RefCell::new(None) };
+}
+
+/// Returns what `work` warns of and notes on this thread, instead of printing it.
+pub fn hold_remarks<T>(work: impl FnOnce() -> T) -> (T, Vec<(Remark, String)>) {
+    HELD.set(Some(Vec::new()));
+    let done = work();
+    (done, HELD.take().unwrap_or_default())
+}
+
+fn print_remark(remark: Remark, what: &str) {
+    let is_held = HELD.with_borrow_mut(|held| held.as_mut().map(|held| held.push((remark, what.to_owned()))).is_some());
+    let (level, name) = match remark {
+        Remark::Warning => ("WARN", "warning"),
+        Remark::Note => ("INFO", "note"),
+    };
     match JSON.load(Ordering::Relaxed) {
-        _ if QUIET.load(Ordering::Relaxed) => {}
+        _ if is_held || QUIET.load(Ordering::Relaxed) => {}
         true => print_message(level, what),
         false => print_message(level, &format!("{name}: {}", escape_controls(what, &[]))),
     }

@@ -23,6 +23,14 @@ use bokehcam::stats::Report;
 /// # Errors
 /// Fails if the signal handler cannot be set.
 pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
+    stop_flag_between("frames")
+}
+
+/// Does the same as [`stop_flag`] for a command that works on `items`.
+///
+/// # Errors
+/// Same as for [`stop_flag`].
+pub fn stop_flag_between(items: &'static str) -> Result<Arc<AtomicBool>, CliError> {
     /// Signals this soon after the first count as the same one.
     const SAME_REQUEST: Duration = Duration::from_millis(100);
     /// Exit code of a program ended by SIGINT, by shell convention.
@@ -43,27 +51,32 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
         bokehcam::network::isolation::shorten_timeouts();
         #[cfg(feature = "gpu")]
         bokehcam::compute::device::begin_shutdown();
-        print_to_stderr("stopping after the current frames; press Ctrl-C again to abort");
+        print_to_stderr(&format!("stopping after the current {items}; press Ctrl-C again to abort"));
     };
     ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;
     Ok(stop)
 }
 
-/// A progress bar of delivered frames on stderr; silent if stderr is no terminal.
+/// A progress bar of delivered frames, or other items, on stderr; silent if stderr is no terminal.
 pub struct Progress(Option<(&'static Screen, Arc<ProgressCount>)>);
 
 impl Progress {
     /// Creates a bar for `frames` frames, or a counter if their number is unknown.
     pub fn new(frames: Option<u64>, global: &Global) -> Self {
+        Self::with_items("frames", frames, global)
+    }
+
+    /// Does the same as [`Progress::new`] for a count of `items`.
+    pub fn with_items(items: &str, count: Option<u64>, global: &Global) -> Self {
         if global.quiet || !io::stderr().is_terminal() {
             return Self(None);
         }
-        let template = match frames {
-            Some(_) => "{wide_bar} {pos}/{len} frames, {rate} a second, {eta} left",
-            None => "{spinner} {pos} frames, {rate} a second, {elapsed}",
+        let template = match count {
+            Some(_) => format!("{{wide_bar}} {{pos}}/{{len}} {items}, {{rate}} a second, {{eta}} left"),
+            None => format!("{{spinner}} {{pos}} {items}, {{rate}} a second, {{elapsed}}"),
         };
-        let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = ProgressBar::with_draw_target(count, ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let rate = |state: &ProgressState, to: &mut dyn fmt::Write| {
             // Writing to memory cannot fail.
             let _ = write!(to, "{:.1}", state.per_sec());

@@ -118,7 +118,7 @@ pub fn run(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers)
         #[cfg(feature = "window")]
         Command::Preview(command) => preview::run(&command, &cli.global, layers.given_settings(matches)),
         Command::Stream(command) => stream::run(&command, &cli.global, layers.given_settings(matches)),
-        Command::Render(command) => render::run(&command, &cli.global, &layers.given_settings(matches)),
+        Command::Render(command) => render::run(*command, &cli.global, &layers.given_settings(matches)),
         Command::Depth(command) => depth::run(&command, &cli.global),
         Command::Ctl(command) => ctl::run(command, &cli.global),
         Command::Service(command) => service::run(&command),

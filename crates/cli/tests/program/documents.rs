@@ -84,6 +84,8 @@ impl Follower {
             copy("portrait/rgb/000000.png", color);
         }
         copy("portrait/depth/000000.png", "depth.png");
+        // Any picture is a mask.
+        copy("portrait/rgb/000000.png", "MASK.png");
         let mut snapshot = png::Encoder::new(fs::File::create(follower.path("NAME.png")).unwrap(), 1, 1);
         snapshot.add_itxt_chunk("bokehcam".to_string(), "--effect=blur\n--rim=0.5\n".to_string()).unwrap();
         snapshot.write_header().unwrap().write_image_data(&[0]).unwrap();

@@ -12,6 +12,7 @@ mod program;
 #[path = "../../../../tests/common/store.rs"]
 mod store;
 
+mod batch;
 mod cli;
 mod ctl;
 #[cfg(feature = "lab")]

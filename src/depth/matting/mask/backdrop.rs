@@ -1,6 +1,9 @@
 //! A known background of the subject: a picture of the same place without it.
 
-use crate::frame::ColorImage;
+use std::ops::Range;
+
+use super::cells::MaskView;
+use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
 /// A background picture, and its exposure and shift relative to the current picture.
 #[derive(Clone, Copy, Debug)]
@@ -25,5 +28,25 @@ impl BackgroundPlate<'_> {
             let at = 3 * place(x, shift, width);
             [0, 1, 2].map(|p| light[p][usize::from(row[at + p])])
         }
+    }
+}
+
+impl MaskView<'_> {
+    /// Adds the known background behind covered pixels.
+    #[inline(always)]
+    pub(super) fn add_background(
+        &self,
+        backdrop: &BackgroundPlate,
+        (xs, y): (Range<usize>, usize),
+        map: &mut DepthMap,
+    ) {
+        let (row, background_at) = (y * self.color.width as usize, backdrop.light_in_row(y));
+        let metres = &map.metres[row..];
+        map.matte.pixels.extend(xs.map(|x| {
+            let (own, light) = (self.light_at(row + x), background_at(x));
+            let difference = std::array::from_fn(|p| own[p] - light[p]);
+            let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
+            MixedPixel { at, near_m, far_m, alpha: 1.0, background_alpha: 1.0, difference }
+        }));
     }
 }

@@ -88,6 +88,8 @@ impl Sums {
 /// The input of matting, and the layout of its cells.
 pub struct MaskView<'a> {
     pub mask: &'a Mask,
+    /// A mask as large as the picture, for where colours say nothing.
+    pub given: Option<&'a Mask>,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
     pub backdrop: Option<&'a BackgroundPlate<'a>>,

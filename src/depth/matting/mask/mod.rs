@@ -6,12 +6,14 @@
 
 mod backdrop;
 mod cells;
+mod outline;
 mod posterior;
 mod sides;
 
 use std::ops::Range;
 
 pub use backdrop::BackgroundPlate;
+pub use outline::{Outline, depth_from_mask};
 
 use crate::color::srgb_to_linear_table;
 use crate::depth::tap::Tap;
@@ -54,14 +56,6 @@ pub struct MaskMatting {
     columns: Vec<Tap>,
 }
 
-/// Returns a depth map in which `mask` is the subject, and all else is far.
-pub fn depth_from_mask(mask: &Mask, color: &ColorImage) -> DepthMap {
-    let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
-    map.metres.fill(DepthMap::FAR_M);
-    MaskMatting::default().compute_matte(mask, color, None, &mut map);
-    map
-}
-
 impl Default for MaskMatting {
     fn default() -> Self {
         let weight = |row: usize, column: usize| {
@@ -96,20 +90,35 @@ impl MaskMatting {
         backdrop: Option<&BackgroundPlate>,
         map: &mut DepthMap,
     ) {
+        self.compute_outlined(mask, (None, true), color, backdrop, map);
+    }
+
+    /// Does the same as [`MaskMatting::compute_matte`]. Where colours do not tell the surfaces apart, alpha is that of
+    /// `given`, as large as the picture, if there is one; without `follows_color`, that is everywhere.
+    fn compute_outlined(
+        &mut self,
+        mask: &Mask,
+        (given, follows_color): (Option<&Mask>, bool),
+        color: &ColorImage,
+        backdrop: Option<&BackgroundPlate>,
+        map: &mut DepthMap,
+    ) {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
         let backdrop = backdrop.filter(|backdrop| backdrop.color.size() == color.size());
         if map.size() != color.size() || mask.alpha.is_empty() || width * height == 0 {
             return;
         }
-        pulp::Arch::new().dispatch(ComputeMatte { matting: self, mask, color, backdrop, map });
+        pulp::Arch::new().dispatch(ComputeMatte { matting: self, mask, given, follows_color, color, backdrop, map });
     }
 }
 
-/// Arguments of [`MaskMatting::compute_matte`].
+/// Arguments of [`MaskMatting::compute_outlined`].
 struct ComputeMatte<'a> {
     matting: &'a mut MaskMatting,
     mask: &'a Mask,
+    given: Option<&'a Mask>,
+    follows_color: bool,
     color: &'a ColorImage,
     backdrop: Option<&'a BackgroundPlate<'a>>,
     map: &'a mut DepthMap,
@@ -120,7 +129,7 @@ impl pulp::WithSimd for ComputeMatte<'_> {
     // Few explicit vectors: the dispatch compiles these loops for the processor's instruction set.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self { matting, mask, color, backdrop, map } = self;
+        let Self { matting, mask, given, follows_color, color, backdrop, map } = self;
         let (width, height) = (color.width as usize, color.height as usize);
         let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(MIN_CELL_PX);
         matting.columns.clear();
@@ -128,14 +137,14 @@ impl pulp::WithSimd for ComputeMatte<'_> {
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
         let MaskMatting { light, posterior, kernel, cells, ends, needed, sums, contrasts, alphas, front, columns } =
             matting;
-        let view = MaskView { mask, color, light, backdrop, columns, cell_px, across, down };
+        let view = MaskView { mask, given, color, light, backdrop, columns, cell_px, across, down };
         view.classify_cells(cells, ends);
         view.gather_colors(cells, needed, sums);
         contrasts.clear();
         for at in 0..across * down {
             let is_beside = || cells[at] == Cell::Band || view.cells_within(at, 1).any(|at| cells[at] == Cell::Band);
             let place = (at / across, at % across);
-            let is_used = needed[at] && is_beside();
+            let is_used = follows_color && needed[at] && is_beside();
             contrasts.push(if is_used { view.compute_contrast(simd, (kernel, sums), place) } else { None });
         }
         alphas.resize(width * height, 0.0);
@@ -216,6 +225,7 @@ impl MaskView<'_> {
                 for x in xs {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
+                    let given = self.given.map(|given| given.alpha[place]);
                     let along = self.enclosing_cells(x, self.across).weight;
                     // With a known background, each pixel has its own discriminant.
                     let discriminant: Option<Discriminant> = match (&background_at, &lines, &fronts) {
@@ -226,8 +236,11 @@ impl MaskView<'_> {
                         _ => None,
                     };
                     let alpha = match discriminant {
-                        Some(own) => posterior.alpha(mask, own.alpha(light), own.precision),
-                        None => mask,
+                        Some(own) => {
+                            let by_color = posterior.alpha(mask, own.alpha(light), own.precision);
+                            given.map_or(by_color, |given| given + (by_color - given) * outline::clarity(own.precision))
+                        }
+                        None => given.unwrap_or(mask),
                     };
                     alphas[place] = alpha;
                     if mask > NEAR_FROM && alpha > NEAR_FROM {
@@ -328,18 +341,5 @@ impl MaskView<'_> {
             let (at, near_m) = (at as u32, DepthMap::SUBJECT_M);
             map.matte.pixels.push(MixedPixel { at, near_m, far_m, alpha, background_alpha, difference });
         }
-    }
-
-    /// Adds the known background behind covered pixels.
-    #[inline(always)]
-    fn add_background(&self, backdrop: &BackgroundPlate, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
-        let (row, background_at) = (y * self.color.width as usize, backdrop.light_in_row(y));
-        let metres = &map.metres[row..];
-        map.matte.pixels.extend(xs.map(|x| {
-            let (own, light) = (self.light_at(row + x), background_at(x));
-            let difference = std::array::from_fn(|p| own[p] - light[p]);
-            let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
-            MixedPixel { at, near_m, far_m, alpha: 1.0, background_alpha: 1.0, difference }
-        }));
     }
 }

@@ -7,10 +7,10 @@ use crate::error::CliError;
 use crate::log;
 use crate::plausible;
 use bokehcam::depth::defocus;
-use bokehcam::depth::matting::mask;
+use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
-use bokehcam::look::Look;
+use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::DepthFile;
 use bokehcam::recording::{PhotoMetadata, snapshot, still};
 use bokehcam::source::photo::{self, PhotoDepth};
@@ -94,7 +94,12 @@ fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Re
             still::check_mask_size(file, (width, height), color.size())?;
             let mask = Mask { width, height, alpha: share };
             plausible::warn_of_mask(file, &mask, color);
-            Ok(Some(Depth::Final(mask::depth_from_mask(&mask, color))))
+            let outline = Outline {
+                grow_px: command.mask_grow,
+                feather_px: usize::from(command.mask_feather),
+                is_exact: look.refine == Refine::Off,
+            };
+            Ok(Some(Depth::Final(depth_from_mask(&mask, outline, color))))
         }
         (None, DepthChoice::SingleCamera(chosen)) => {
             let map = source::single_camera::compute_picture_depth(chosen, &command.source_options(), look, color)?;

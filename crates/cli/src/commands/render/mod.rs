@@ -1,13 +1,16 @@
 //! `render`: blurs a still picture.
 
+mod batch;
 mod debug;
 mod debug_pictures;
 mod input;
+mod listing;
+mod map_folder;
 
 use std::fmt::Display;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, value_parser};
 
 use input::{FoundDepth, Input, read_input};
 
@@ -34,8 +37,11 @@ use bokehcam::recording::still::{self, PhotoFormat};
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
-/// Blur one still picture
-#[derive(Args, Debug)]
+/// Largest change of a mask, in pixels.
+const MAX_MASK_PX: i64 = 200;
+
+/// Blur one still picture, or many
+#[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
@@ -47,22 +53,40 @@ Examples:
   bokehcam render photo.jpg --effect blur --blur 12 --aperture heart --out hearts.png
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
   bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
+  bokehcam render shots/ --out blurred/
   bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
 pub struct RenderCommand {
-    /// The picture, PNG or JPEG [default: the original picture of the snapshot in --like]
-    #[arg(required_unless_present = "like")]
+    /// The picture, PNG or JPEG; or many of them: files, folders, or patterns such as 'shots/*.jpg'
+    /// [default: the original picture of the snapshot in --like]
+    #[arg(value_name = "IMAGE", required_unless_present = "like")]
+    images: Vec<PathBuf>,
+    /// The only picture, or that of many that this run blurs.
+    #[arg(skip)]
     image: Option<PathBuf>,
-    /// Its depth: a grey PNG, JPEG or TIFF, or numbers as TIFF, PFM, NPY, NPZ or EXR; or disparity written by `depth`
+    /// Its depth: a grey PNG, JPEG or TIFF, or numbers as TIFF, PFM, NPY, NPZ or EXR; or disparity written by `depth`. For
+    /// many pictures a folder, with NAME.png, NAME.pfm or NAME-depth.* for each picture NAME
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
-    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
+    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp. For many pictures a
+    /// folder, with NAME.png or NAME-mask.* for each picture NAME
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
+    /// Move the outline of --mask outwards by this much, in pixels of the picture; inwards if negative. Then it is
+    /// fitted to the colours of the picture, unless --refine off is given
+    #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
+          value_parser = value_parser!(i32).range(-MAX_MASK_PX..=MAX_MASK_PX))]
+    mask_grow: i32,
+    /// Turn the outline of --mask into a gradual transition, of so many pixels on both sides
+    #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
+          value_parser = value_parser!(u16).range(0..=MAX_MASK_PX))]
+    mask_feather: u16,
     /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
     /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
     like: Option<PathBuf>,
-    /// File for the result, .png or .jpg
+    /// File for the result, .png or .jpg. For many pictures a folder: each result has the name and kind of its picture.
+    /// One that is already there is kept, even if it is older than its picture or has other settings, unless --force
+    /// is given
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
     /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
@@ -85,11 +109,28 @@ pub struct RenderCommand {
 ///
 /// # Errors
 /// Fails if a picture cannot be read or written, the options do not fit it, or the blur fails.
-pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
+pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
+    if listing::is_many(&command.images, &command.out) {
+        return batch::run(&command, global, given);
+    }
+    command.image = command.images.pop();
+    check_outputs(&command)?;
+    let look = build_look(&command)?;
+    create_parent_folder(&command.out)?;
+    warn_of_leftovers([command.out.as_path()]);
+    let Rendered { executor, depth_by } = render(&command, &look, given)?;
+    if !global.quiet {
+        depth_by.iter().for_each(|by| terminal::print_to_stderr(&format!("depth by {by}")));
+        terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
+    }
+    Ok(())
+}
+
+/// Refuses outputs that exist, without `--force`, or that are inputs.
+fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    let sources = input_files(command);
-    for source in &sources {
+    for source in &input_files(command) {
         refuse_overwriting_source("--out", &command.out, source)?;
         // That folder's files have fixed names, which may match a source.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
@@ -98,6 +139,11 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
             refuse_overwriting_source("--debug-dir", dir, source)?;
         }
     }
+    Ok(())
+}
+
+/// Builds the look, for depth that a picture can have.
+fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
     let elsewhere = match &command.blur.depth {
         DepthChoice::Folder(folder) => Some(folder.display().to_string()),
         DepthChoice::Device(name) => Some(name.clone()),
@@ -111,9 +157,21 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
             DepthChoice::suggest_keyword(&name)
         )));
     }
-    let look = look::build_look(&command.blur, &command.computing.quality)?;
-    let Input { color, metadata, depth, depth_from, found } = read_input(command, &look)?;
-    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
+    look::build_look(&command.blur, &command.computing.quality)
+}
+
+/// How a picture was rendered.
+struct Rendered {
+    /// Description of the executor.
+    executor: String,
+    /// Origin of depth that was found in or beside the photo.
+    depth_by: Option<String>,
+}
+
+/// Blurs the command's only picture, and writes the result.
+fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<Rendered, CliError> {
+    let Input { color, metadata, depth, depth_from, found } = read_input(command, look)?;
+    let look = source::adapt_look(look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &color, (depth.as_ref(), depth_from, found.as_ref()), given);
@@ -125,8 +183,6 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         _ => look,
     };
     let computing = command.computing.to_compute_options();
-    create_parent_folder(&command.out)?;
-    warn_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
         None => engine::still::blur_picture(&look, color, depth, &computing)?,
@@ -137,14 +193,10 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &GivenSetti
         metadata = metadata.for_jpeg();
     }
     still::write_photo(&command.out, &result, &metadata, command.output.force)?;
-    if !global.quiet {
-        if !metadata.lost_properties.is_empty() {
-            log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
-        }
-        found.iter().for_each(|found| terminal::print_to_stderr(&format!("depth by {}", found.by)));
-        terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
+    if !metadata.lost_properties.is_empty() {
+        log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
     }
-    Ok(())
+    Ok(Rendered { executor, depth_by: found.map(|found| found.by) })
 }
 
 impl RenderCommand {
