@@ -5,7 +5,7 @@
 //! [`MAX_DECODER_BYTES`].
 
 use std::fs::File;
-use std::io::{BufReader, Cursor, ErrorKind, Read, Seek};
+use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::path::Path;
 
 use image::codecs::jpeg::JpegDecoder;
@@ -18,7 +18,7 @@ use super::heif;
 use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
 use super::samples::SampleFormat;
-use super::tiff_directory::TiffDirectories;
+use super::tiff_directory::is_raw_tiff;
 use crate::files::input;
 
 /// What a message names where no picture is found.
@@ -35,9 +35,6 @@ const MAX_METADATA_BYTES: usize = 64 << 20;
 
 /// Memory limit for other files with their pixels: enough for 8192 x 8192 pixels of four 16-bit channels.
 const MAX_DECODER_BYTES: u64 = 576 << 20;
-
-/// Bytes of a TIFF in which its first directory is looked for; cameras write it at the start.
-const MAX_TIFF_START_BYTES: u64 = 1 << 20;
 
 /// A picture whose header was read.
 pub(super) enum EncodedPicture<'a> {
@@ -83,8 +80,28 @@ impl<'a> EncodedPicture<'a> {
         Ok(coded)
     }
 
+    /// Opens a PNG or JPEG in memory.
+    pub(super) fn open_bytes(bytes: &'a [u8]) -> Result<Self, PictureFault> {
+        match FileKind::detect(&bytes[..bytes.len().min(file_kind::START_BYTES)]) {
+            Some(FileKind::Png) => Ok(Self::Whole(decode_with(Cursor::new(bytes), ImageFormat::Png)?)),
+            Some(FileKind::Jpeg) if jpeg::is_complete(bytes) => {
+                Ok(Self::Whole(decode_with(Cursor::new(bytes), ImageFormat::Jpeg)?))
+            }
+            Some(FileKind::Jpeg) => Err(PictureFault::Truncated),
+            kind => Err(FileKind::fault(kind, PICTURES)),
+        }
+    }
+
     fn open_png(file: File) -> Result<Self, PictureFault> {
         Ok(Self::Png(Box::new(create_png_decoder(file)?.read_info().map_err(png_fault)?)))
+    }
+
+    /// Returns the metadata before the pixels.
+    pub(super) fn metadata(self) -> PhotoMetadata {
+        match self {
+            Self::Png(reader) => PhotoMetadata::from_png(reader.info()),
+            Self::Whole(mut decoder) => PhotoMetadata::from_decoder(&mut *decoder),
+        }
     }
 
     pub(super) fn size(&self) -> (u32, u32) {
@@ -230,12 +247,20 @@ fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> 
     }
 }
 
-/// Creates a decoder of 8 or 16 bits, whose size is checked.
+/// Creates a decoder of 8 or 16 bits for a file, whose size is checked.
 fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDecoder>, PictureFault> {
     if format == ImageFormat::Tiff && is_raw_tiff(&mut file)? {
         return Err(FileKind::fault(Some(file_kind::RAW), PICTURES));
     }
-    let mut reader = ImageReader::with_format(BufReader::new(file), format);
+    decode_with(BufReader::new(file), format)
+}
+
+/// Creates a decoder of 8 or 16 bits, whose size is checked.
+fn decode_with<'a>(
+    reader: impl BufRead + Seek + 'a,
+    format: ImageFormat,
+) -> Result<Box<dyn ImageDecoder + 'a>, PictureFault> {
+    let mut reader = ImageReader::with_format(reader, format);
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_DECODER_BYTES);
     reader.limits(limits);
@@ -245,23 +270,6 @@ fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDe
         true => Ok(Box::new(decoder)),
         false => Err(PictureFault::Unsupported("floating-point samples".into())),
     }
-}
-
-/// Returns whether a TIFF is the raw picture of a camera, whose first picture is only a small copy or is not developed.
-fn is_raw_tiff(file: &mut File) -> Result<bool, PictureFault> {
-    const SUBFILE_TYPE: u16 = 254;
-    const REDUCED: usize = 1;
-    const PHOTOMETRIC: u16 = 262;
-    const COLOR_FILTER_ARRAY: u16 = 32803;
-    const DNG_VERSION: u16 = 50706;
-    let mut start = Vec::new();
-    file.take(MAX_TIFF_START_BYTES).read_to_end(&mut start)?;
-    file.rewind()?;
-    let Some(directory) = TiffDirectories::parse(&start) else { return Ok(false) };
-    let value_at = |tag| directory.find_tag(tag).map(|at| at + 8);
-    let is_reduced = value_at(SUBFILE_TYPE).and_then(|at| directory.u32_at(at)).is_some_and(|kind| kind & REDUCED != 0);
-    let is_undeveloped = value_at(PHOTOMETRIC).and_then(|at| directory.u16_at(at)) == Some(COLOR_FILTER_ARRAY);
-    Ok(is_reduced || is_undeveloped || value_at(DNG_VERSION).is_some())
 }
 
 fn sample_format(color: ColorType) -> SampleFormat {

@@ -67,16 +67,26 @@ pub(super) fn read_color(
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let (found, samples) = (coded.size(), coded.samples());
+    let found = coded.size();
     if let Some(expected) = expected.filter(|&expected| expected != found) {
         return Err(PictureFault::Size { found, expected });
     }
-    into.resize(found.0, found.1);
+    decode_color(coded, &mut scratch.pixels, into)
+}
+
+/// Decodes an opened picture as [`read_color`] does. `pixels` is working memory.
+pub(super) fn decode_color(
+    coded: EncodedPicture,
+    pixels: &mut Vec<u8>,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
+    let ((width, height), samples) = (coded.size(), coded.samples());
+    into.resize(width, height);
     if samples == (SampleFormat { channels: 3, is_16bit: false }) {
-        return coded.decode_rgb(&mut scratch.pixels, &mut into.rgb);
+        return coded.decode_rgb(pixels, &mut into.rgb);
     }
     let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-    coded.decode_runs(&mut scratch.pixels, |run, row| {
+    coded.decode_runs(pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             *rgb = channels.map(|channel| match samples.is_16bit {

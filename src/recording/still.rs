@@ -6,8 +6,10 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageFormat, RgbImage};
 
+use super::coded::EncodedPicture;
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
 use super::error::RecordingError;
@@ -39,12 +41,27 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingE
     let mut metadata = read.map_err(RecordingError::picture(path))?;
     drop(scratch);
 
+    let orientation = metadata.take_orientation();
+    Ok((turned(image, orientation), metadata))
+}
+
+/// Returns a picture turned as an orientation tag says.
+pub(super) fn turned(image: ColorImage, orientation: Orientation) -> ColorImage {
     let (width, height) = image.size();
     let rgb = RgbImage::from_raw(width, height, image.rgb).unwrap_or_default();
     let mut upright = DynamicImage::ImageRgb8(rgb);
-    upright.apply_orientation(metadata.take_orientation());
+    upright.apply_orientation(orientation);
     let (width, height) = (upright.width(), upright.height());
-    Ok((ColorImage { width, height, rgb: upright.into_bytes() }, metadata))
+    ColorImage { width, height, rgb: upright.into_bytes() }
+}
+
+/// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.
+pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
+    if coded::read_kind(path)? == file_kind::HEIC {
+        return None;
+    }
+    let mut memory = Vec::new();
+    Some(EncodedPicture::open(path, &mut memory).ok()?.metadata().take_orientation())
 }
 
 /// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.

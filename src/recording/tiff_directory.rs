@@ -1,5 +1,13 @@
 //! Directories of TIFF files, which EXIF and Multi-Picture files have as well (TIFF 6.0, section 2).
 
+use std::fs::File;
+use std::io::{Read, Seek};
+
+use super::fault::PictureFault;
+
+/// Bytes of a TIFF in which its first directory is looked for; cameras write it at the start.
+const MAX_TIFF_START_BYTES: u64 = 1 << 20;
+
 /// The structure of a TIFF file; no position leads outside of it.
 pub(super) struct TiffDirectories<'a> {
     file: &'a [u8],
@@ -34,4 +42,21 @@ impl<'a> TiffDirectories<'a> {
         let entries = (0..usize::from(self.u16_at(directory)?)).map(|entry| directory + 2 + 12 * entry);
         entries.into_iter().find(|&at| self.u16_at(at) == Some(tag))
     }
+}
+
+/// Returns whether a TIFF is the raw picture of a camera, whose first picture is only a small copy or is not developed.
+pub(super) fn is_raw_tiff(file: &mut File) -> Result<bool, PictureFault> {
+    const SUBFILE_TYPE: u16 = 254;
+    const REDUCED: usize = 1;
+    const PHOTOMETRIC: u16 = 262;
+    const COLOR_FILTER_ARRAY: u16 = 32803;
+    const DNG_VERSION: u16 = 50706;
+    let mut start = Vec::new();
+    file.take(MAX_TIFF_START_BYTES).read_to_end(&mut start)?;
+    file.rewind()?;
+    let Some(directory) = TiffDirectories::parse(&start) else { return Ok(false) };
+    let value_at = |tag| directory.find_tag(tag).map(|at| at + 8);
+    let is_reduced = value_at(SUBFILE_TYPE).and_then(|at| directory.u32_at(at)).is_some_and(|kind| kind & REDUCED != 0);
+    let is_undeveloped = value_at(PHOTOMETRIC).and_then(|at| directory.u16_at(at)) == Some(COLOR_FILTER_ARRAY);
+    Ok(is_reduced || is_undeveloped || value_at(DNG_VERSION).is_some())
 }

@@ -46,7 +46,7 @@ use crate::computing::ComputeOptions;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
-use crate::frame::DepthMap;
+use crate::frame::{ColorImage, DepthMap};
 use crate::look::{Effect, Look, SourceDepth, Strength};
 use crate::optics::StereoRig;
 use crate::pipeline::{BlurSetup, Run};
@@ -103,8 +103,21 @@ pub struct Source {
     pub guide: Option<Arc<Guide>>,
     /// The first map of recorded depth, if the look uses depth.
     pub first_depth: Option<DepthMap>,
-    /// What was assumed about its files, a line each.
+    /// What its files say besides.
+    pub findings: Findings,
+}
+
+/// What the files of a source say besides pictures and depth.
+#[derive(Debug, Default)]
+pub struct Findings {
+    /// What was assumed about them, a line each.
     pub notes: Vec<String>,
+    /// A short description of where the depth of a photo comes from.
+    pub depth_by: Option<String>,
+    /// The focus that a photo was taken with, which replaces `auto`.
+    pub focus: Option<FocusRule>,
+    /// The sharp original inside a photo, which is then the picture.
+    pub original: Option<ColorImage>,
 }
 
 /// Options for opening a source.
@@ -169,7 +182,7 @@ impl Source {
             persons: None,
             guide: None,
             first_depth: None,
-            notes: Vec::new(),
+            findings: Findings::default(),
         }
     }
 
@@ -218,8 +231,8 @@ impl Source {
             let depth_from = DepthOrigin::Stereo;
             return Ok(Self { rig: Some(rig), depth_from, ..Self::from_camera(source.camera, depth) });
         }
-        let Opened { camera, depth, first_depth, notes, .. } = source;
-        Ok(Self { depth_from, first_depth, notes, ..Self::from_camera(camera, depth) })
+        let Opened { camera, depth, first_depth, findings, .. } = source;
+        Ok(Self { depth_from, first_depth, findings, ..Self::from_camera(camera, depth) })
     }
 
     /// Returns whether its frames have depth.
@@ -232,7 +245,8 @@ impl Source {
     /// # Errors
     /// Same as for [`adapt_look`].
     pub fn adapt_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
-        adapt_look(look, &options.depth_choice, self.has_depth())
+        let focus = self.findings.focus.filter(|_| look.focus == FocusRule::Auto).unwrap_or(look.focus);
+        adapt_look(&Look { focus, ..look.clone() }, &options.depth_choice, self.has_depth())
     }
 
     /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.

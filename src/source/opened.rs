@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 #[cfg(feature = "camera")]
 use super::name;
-use super::{DepthChoice, DepthOrigin, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video};
+use super::{
+    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video,
+};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
@@ -42,8 +44,8 @@ pub(super) struct Opened {
     pub depth: Option<Box<dyn DepthSource>>,
     pub depth_from: DepthOrigin,
     pub first_depth: Option<DepthMap>,
-    /// What was assumed about the files, a line each.
-    pub notes: Vec<String>,
+    /// What the files say besides.
+    pub findings: Findings,
     /// The stereo geometry that the source states.
     pub pair: StereoGeometry,
     /// The number of disparities, if a recording states it.
@@ -59,7 +61,7 @@ impl Opened {
             depth: None,
             depth_from: DepthOrigin::Nothing,
             first_depth: None,
-            notes: Vec::new(),
+            findings: Findings::default(),
             pair: StereoGeometry::Uncalibrated,
             disparities: None,
         };
@@ -94,19 +96,18 @@ impl Opened {
                     depth,
                     depth_from,
                     first_depth,
-                    notes,
+                    findings: Findings { notes, ..Findings::default() },
                     pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
                     disparities,
                     ..without_depth(Box::new(camera))
                 })
             }
             SourceName::Photo(path) => {
-                let photo::ReadPhoto { color, depth: map, depth_from, notes } =
-                    photo::read_photo(path, request.options)?;
+                let photo::ReadPhoto { color, depth, depth_from, findings } = photo::read_photo(path, request.options)?;
                 request.check_relative_depth(depth_from)?;
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
-                let depth = map.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
-                Ok(Self { depth, depth_from, notes, ..without_depth(Box::new(camera)) })
+                let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
+                Ok(Self { depth, depth_from, findings, ..without_depth(Box::new(camera)) })
             }
             SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
             SourceName::Video(path) => {

@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::options::Depth;
-use super::{DepthChoice, DepthOrigin, Options, Source, SourceError, SourceName};
+use super::{DepthChoice, DepthOrigin, Findings, Options, Source, SourceError, SourceName};
 use crate::depth::FrameInput;
+use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
-use crate::recording::depth_file::{self, DepthFile, Distances};
+use crate::recording::depth_file::{self, DepthFile, DepthInside, Distances};
+use crate::recording::embedded::Focus;
 use crate::recording::{snapshot, still};
 
 /// Suffixes of depth files, after the photo's stem and before [`EXTENSIONS`].
@@ -51,6 +53,10 @@ pub struct PhotoDepth {
     pub by: String,
     /// What was assumed about it, a line each.
     pub notes: Vec<String>,
+    /// The photo's sharp original inside it, which is then the picture of the map.
+    pub original: Option<ColorImage>,
+    /// The focus that the photo was taken with, which replaces `auto`.
+    pub focus: Option<FocusRule>,
 }
 
 /// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it.
@@ -65,13 +71,14 @@ pub fn read_default_depth(
 ) -> Result<Option<PhotoDepth>, SourceError> {
     let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
     let measured = source.is_measured();
-    let Source { depth: Some(depth), depth_from: from, networks, notes, .. } = &mut source else { return Ok(None) };
+    let Source { depth: Some(depth), depth_from: from, networks, findings, .. } = &mut source else { return Ok(None) };
+    let Findings { notes, depth_by, focus, original } = std::mem::take(findings);
     let mut map = DepthMap::default();
+    let color = original.as_ref().unwrap_or(color);
     depth
         .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
-    let describe_file = || find_depth_file(path).map(|file| format!("{}, beside it", file.display()));
-    let by = networks.take().or_else(describe_file).unwrap_or_default();
-    Ok(Some(PhotoDepth { map, from: *from, measured, by, notes: std::mem::take(notes) }))
+    let by = networks.take().or(depth_by).unwrap_or_default();
+    Ok(Some(PhotoDepth { map, from: *from, measured, by, notes, original, focus }))
 }
 
 /// Returns the files to read for a photo: the picture, and its depth file if there is one.
@@ -86,25 +93,59 @@ pub(super) struct ReadPhoto {
     pub color: ColorImage,
     pub depth: Option<DepthMap>,
     pub depth_from: DepthOrigin,
-    /// What was assumed about the depth, a line each.
-    pub notes: Vec<String>,
+    pub findings: Findings,
 }
 
 /// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the file `NAME-depth` or
-/// `NAME.depth` next to it, unless the options request another origin.
+/// `NAME.depth` next to it, or inside it as phones save it, unless the options request another origin. A photo with depth
+/// inside is its sharp original, if that is inside, too.
 ///
 /// # Errors
-/// The photo or its depth file is unreadable, or the depth does not fit it.
+/// The photo or its depth file is unreadable, or the depth does not fit it. Depth inside that cannot be read is a note.
 pub(super) fn read_photo(path: &Path, options: &Options) -> Result<ReadPhoto, SourceError> {
     let path = &original_path(path);
     let color = still::read_color(path)?;
-    let is_wanted = matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
-    let Some(file) = find_depth_file(path).filter(|_| is_wanted) else {
-        return Ok(ReadPhoto { color, depth: None, depth_from: DepthOrigin::Nothing, notes: Vec::new() });
-    };
-    let read = read_depth_file(&file, &options.depth, color.size())?;
-    let notes = read.notes.iter().map(|note| format!("{}: {note}", file.display())).collect();
-    Ok(ReadPhoto { color, depth_from: read.distances.into(), depth: Some(read.map), notes })
+    let depth_from = DepthOrigin::Nothing;
+    let mut photo = ReadPhoto { color, depth: None, depth_from, findings: Findings::default() };
+    if !matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded) {
+        return Ok(photo);
+    }
+    if let Some(file) = find_depth_file(path) {
+        let read = read_depth_file(&file, &options.depth, photo.color.size())?;
+        photo.findings.notes = read.notes.iter().map(|note| format!("{}: {note}", file.display())).collect();
+        photo.findings.depth_by = Some(format!("{}, beside it", file.display()));
+        (photo.depth_from, photo.depth) = (read.distances.into(), Some(read.map));
+        return Ok(photo);
+    }
+    match depth_file::read_inside(path, photo.color.size()) {
+        Ok(Some(inside)) => photo.take_inside(path, inside),
+        Ok(None) => {}
+        Err(error) => photo.findings.notes.push(error.to_string()),
+    }
+    Ok(photo)
+}
+
+impl ReadPhoto {
+    /// Takes the depth inside the photo `path`, and notes what of it is used.
+    fn take_inside(&mut self, path: &Path, inside: DepthInside) {
+        let DepthInside { depth, original, focus, kind } = inside;
+        let (name, findings) = (path.display(), &mut self.findings);
+        findings.notes.extend(depth.notes.iter().map(|note| format!("{name}: {note}")));
+        findings.depth_by = Some(format!("{name} itself ({kind})"));
+        (self.depth_from, self.depth) = (depth.distances.into(), Some(depth.map));
+        if let Some(original) = original {
+            findings.notes.push(format!("{name}: the original before the phone's own blur is inside, and is used"));
+            self.color = original.clone();
+            findings.original = Some(original);
+        }
+        findings.focus = focus.map(|focus| match focus {
+            Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },
+            Focus::Distance(distance) => FocusRule::Metres(distance),
+        });
+        if let Some(FocusRule::Point { x, y }) = findings.focus {
+            findings.notes.push(format!("{name}: the focus is that of the photo, {x:.3},{y:.3}; --focus changes it"));
+        }
+    }
 }
 
 /// Reads the depth map `file` for a photo of `color` (columns, rows) pixels.

@@ -1,8 +1,9 @@
-//! Depth maps of single pictures, as files of any tool: reads the numbers ([`values`]), decides what they mean
-//! ([`meaning`]), and fits the map to its picture ([`fit`]).
+//! Depth maps of single pictures, as files of any tool or inside photos ([`inside`]): reads the numbers ([`values`]),
+//! decides what they mean ([`meaning`]), and fits the map to its picture ([`fit`]).
 
 mod exr;
 mod fit;
+mod inside;
 mod meaning;
 mod npy;
 mod tiff;
@@ -12,6 +13,7 @@ mod values;
 use std::path::Path;
 
 pub use fit::{Fit, covers, describe_stretch};
+pub use inside::{DepthInside, read_inside};
 pub use unit::DepthUnit;
 
 use super::RecordingError;

@@ -43,6 +43,17 @@ pub(super) enum Samples {
     Float,
 }
 
+impl Samples {
+    /// Returns the largest code; 1 for floats.
+    pub fn white(self) -> f32 {
+        match self {
+            Self::Eight => 255.0,
+            Self::Sixteen | Self::Whole => 65535.0,
+            Self::Float => 1.0,
+        }
+    }
+}
+
 impl Values {
     /// Returns the number of units per pixel if the numbers are disparities.
     pub fn disparities_per_px(&self) -> f32 {
@@ -94,15 +105,21 @@ fn read_codes(path: &Path) -> Result<Values, PictureFault> {
         PictureFault::Format(_) => PictureFault::Format(FORMATS),
         fault => fault,
     })?;
+    let (values, mut metadata) = decode_codes(coded)?;
+    Ok(Values { stated: read_stated_unit(path), ..values }.turned(metadata.take_orientation()))
+}
+
+/// Decodes the codes of a picture as stored.
+pub(super) fn decode_codes(coded: EncodedPicture) -> Result<(Values, PhotoMetadata), PictureFault> {
     let ((width, height), format) = (coded.size(), coded.samples());
     let mut numbers = vec![0.0; width as usize * height as usize];
     let sample = |pixel: &[u8], channel: usize| match format.is_16bit {
         true => f32::from(u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])),
         false => f32::from(pixel[channel]),
     };
-    let white = if format.is_16bit { 65535.0 } else { 255.0 };
-    let mut colors = ColorCount::new(white);
-    let mut metadata: PhotoMetadata = coded.decode_runs(&mut Vec::new(), |run, row| {
+    let samples = if format.is_16bit { Samples::Sixteen } else { Samples::Eight };
+    let mut colors = ColorCount::new(samples.white());
+    let metadata = coded.decode_runs(&mut Vec::new(), |run, row| {
         let places = numbers[run.first..].iter_mut().step_by(run.step);
         for (number, pixel) in places.zip(row.chunks_exact(format.bytes_per_pixel())) {
             *number = sample(pixel, 0);
@@ -117,9 +134,7 @@ fn read_codes(path: &Path) -> Result<Values, PictureFault> {
         }
     })?;
     colors.check(numbers.len())?;
-    let samples = if format.is_16bit { Samples::Sixteen } else { Samples::Eight };
-    let values = Values { size: (width, height), numbers, samples, stated: read_stated_unit(path) };
-    Ok(values.turned(metadata.take_orientation()))
+    Ok((Values { size: (width, height), numbers, samples, stated: None }, metadata))
 }
 
 /// Reads the unit that a PNG of ours states.
@@ -160,7 +175,8 @@ impl ColorCount {
 }
 
 impl Values {
-    fn turned(self, orientation: Orientation) -> Self {
+    /// Returns the map turned as an orientation tag says.
+    pub fn turned(self, orientation: Orientation) -> Self {
         if orientation == Orientation::NoTransforms {
             return self;
         }

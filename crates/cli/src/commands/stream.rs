@@ -154,7 +154,7 @@ impl Opened {
             window: false,
         };
         unused::warn_of_unused(&given.settings, &unused);
-        source.notes.iter().for_each(|note| log::note(note));
+        source.findings.notes.iter().for_each(|note| log::note(note));
         if !plausible::warn_of_source(&source, &look, &options)
             && let Some(map) = source.first_depth.as_ref()
         {

@@ -1,5 +1,6 @@
 //! `depth`: the disparity of one stereo pair, or its depth.
 
+mod inside;
 mod preview;
 
 use std::path::{Path, PathBuf};
@@ -41,12 +42,13 @@ const DEFAULT_DISPARITIES: u32 = 64;
 Examples:
   bokehcam depth im0.png im1.png --calib calib.txt --out disparity.pfm --preview disparity.png
   bokehcam depth left.png right.png --max-disparity 128 --out disparity.png
+  bokehcam depth phone.jpg --out depth.pfm
   bokehcam depth left.png right.png --focal-px 707 --baseline-m 0.54 --metres --out depth.pfm")]
 pub struct DepthCommand {
     /// Picture of the left camera, PNG or JPEG
     left: PathBuf,
-    /// Picture of the right camera
-    right: PathBuf,
+    /// Picture of the right camera; without it, LEFT is a photo of a phone, whose own depth is extracted
+    right: Option<PathBuf>,
     /// File for the result: .pfm (float pixels, infinity = unknown) or .png (16 bits, 256 units per pixel, 0 = unknown)
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
@@ -106,8 +108,9 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
             terminal::print_to_stderr(&format!("note: {text}"));
         }
     };
+    let Some(right) = &command.right else { return inside::extract(command, global) };
     let mut color = still::read_color(&command.left)?;
-    let mut right = to_luma(&still::read_color(&command.right)?);
+    let mut right = to_luma(&still::read_color(right)?);
     let size = color.size();
     if right.size() != size {
         return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
@@ -178,6 +181,17 @@ impl DepthCommand {
     /// Rejects conflicting options and files before reading any picture.
     fn check_options(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
+        let is_stereo = self.metres
+            || self.preview.is_some()
+            || self.max_disparity.is_some()
+            || self.focal_px.is_some()
+            || !self.calib.is_empty();
+        if self.right.is_none() && is_stereo {
+            return usage(
+                "--metres, --preview, --max-disparity, --calib and --focal-px are for two pictures: add that of the right \
+                 camera",
+            );
+        }
         if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
             return usage("--metres needs the stereo geometry: give --calib FILE, or --focal-px and --baseline-m");
         }
@@ -194,7 +208,7 @@ impl DepthCommand {
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name the same file; each needs its own");
         }
-        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+        for read in [&self.left].into_iter().chain(&self.right).chain(&self.calib) {
             refuse_overwriting_source("--out", &self.out, read)?;
             self.preview.as_ref().map_or(Ok(()), |preview| refuse_overwriting_source("--preview", preview, read))?;
         }

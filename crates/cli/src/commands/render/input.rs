@@ -7,6 +7,7 @@ use crate::error::CliError;
 use crate::log;
 use crate::plausible;
 use bokehcam::depth::defocus;
+use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
@@ -31,6 +32,8 @@ pub(super) struct Input {
 pub(super) struct FoundDepth {
     pub measured: bool,
     pub by: String,
+    /// The focus that the photo was taken with, which replaces `auto`.
+    pub focus: Option<FocusRule>,
 }
 
 /// Reads the picture, its metadata, and its depth, if any. Inputs not named in the command come from the snapshot of
@@ -68,12 +71,13 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
 /// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
 fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
     let found = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
-    let Some(PhotoDepth { map, from, measured, by, notes }) = found else { return Ok(()) };
+    let Some(PhotoDepth { map, from, measured, by, notes, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {
         plausible::warn_of_subject(None, &map, None);
     }
     notes.iter().for_each(|note| log::note(note));
-    input.found = Some(FoundDepth { measured, by });
+    input.found = Some(FoundDepth { measured, by, focus });
+    input.color = original.unwrap_or_else(|| std::mem::take(&mut input.color));
     input.depth_from = from;
     input.depth = Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) });
     Ok(())

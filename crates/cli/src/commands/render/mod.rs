@@ -27,6 +27,7 @@ use crate::settings::unused::FrameOrigin;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::EdgeAlignment;
+use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
@@ -145,7 +146,7 @@ fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
 /// Builds the look, for depth that a picture can have.
 fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
     let elsewhere = match &command.blur.depth {
-        DepthChoice::Folder(folder) => Some(folder.display().to_string()),
+        DepthChoice::Folder(path) | DepthChoice::Video(path) => Some(path.display().to_string()),
         DepthChoice::Device(name) => Some(name.clone()),
         DepthChoice::Stereo => Some("stereo".to_owned()),
         _ => None,
@@ -171,7 +172,9 @@ struct Rendered {
 /// Blurs the command's only picture, and writes the result.
 fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<Rendered, CliError> {
     let Input { color, metadata, depth, depth_from, found } = read_input(command, look)?;
-    let look = source::adapt_look(look, &command.blur.depth, depth.is_some())?;
+    let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
+    let look = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
+    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &color, (depth.as_ref(), depth_from, found.as_ref()), given);

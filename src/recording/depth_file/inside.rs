@@ -1,0 +1,121 @@
+//! The depth inside a photo, as phones save it.
+
+use std::path::Path;
+
+use image::metadata::Orientation;
+
+use super::values::{Values, decode_codes};
+use super::{DepthFile, Distances, fit, meaning};
+use crate::frame::{ColorImage, DepthMap};
+use crate::recording::coded::EncodedPicture;
+use crate::recording::embedded::{self, EmbeddedDepth, Focus};
+use crate::recording::fault::PictureFault;
+use crate::recording::{PhotoMetadata, RecordingError, decode, still};
+
+/// A photo with its own depth.
+#[derive(Debug)]
+pub struct DepthInside {
+    /// Its depth; distances without a unit are [`Distances::Relative`], but their ratios are those of the scene.
+    pub depth: DepthFile,
+    /// The picture before the phone's own blur, upright, if it is there.
+    pub original: Option<ColorImage>,
+    /// The focus that the photo was taken with: a point as fractions of width and height, or a distance in the units of
+    /// the depth.
+    pub focus: Option<Focus>,
+    /// The kind of container, such as `GDepth`.
+    pub kind: &'static str,
+}
+
+/// Reads the depth inside the photo `path`, whose upright picture has `color` (columns, rows) pixels; `None` if there is
+/// none. Its larger values are far or near as the file says.
+///
+/// # Errors
+/// The file claims to have depth that cannot be read, or of which nothing is usable.
+pub fn read_inside(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, RecordingError> {
+    read(path, color).map_err(RecordingError::picture(path))
+}
+
+fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFault> {
+    let Some(found) = embedded::read(path)? else { return Ok(None) };
+    // Map, original and focus belong to the picture as stored; HEIC is upright once it is converted.
+    let orientation = still::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    let EmbeddedDepth { kind, map, meaning, is_metric, focus, original } = found;
+    let broken =
+        |what: &str, fault: &PictureFault| PictureFault::EmbeddedDepth { kind, what: format!("{what}: {fault}") };
+
+    let coded = EncodedPicture::open_bytes(&map).map_err(|fault| broken("the map", &fault))?;
+    let (values, _) = decode_codes(coded).map_err(|fault| broken("the map", &fault))?;
+    let Values { size: (width, height), numbers, samples, .. } = values.turned(orientation);
+    let white = samples.white();
+    let depth = |number: f32| {
+        let depth = meaning.to_depth(number / white);
+        if DepthMap::is_known(depth) { depth } else { 0.0 }
+    };
+    let map = DepthMap { width, height, metres: numbers.into_iter().map(depth).collect(), ..DepthMap::default() };
+    let distances = if is_metric { Distances::Metres } else { Distances::Relative };
+    let mut file = DepthFile { map, distances, notes: Vec::new() };
+    meaning::check_usable(&file.map, false).map_err(|fault| broken("the map", &fault))?;
+
+    let original = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation) {
+        Ok(original) => Some(original),
+        Err(fault) => {
+            file.notes.push(format!("the original picture inside ({kind}) is left out: {fault}"));
+            None
+        }
+    });
+    let color = original.as_ref().map_or(color, ColorImage::size);
+    fit::fit_to(&mut file, None, color).map_err(|fault| broken("the map", &fault))?;
+    let focus = focus.map(|focus| match focus {
+        Focus::Point { x, y } => turn_point(x, y, orientation),
+        Focus::Distance(distance) => Focus::Distance(distance),
+    });
+    Ok(Some(DepthInside { depth: file, original, focus, kind }))
+}
+
+/// Decodes the original, and turns it as its own tag says, or else as the photo's does.
+fn decode_original(bytes: &[u8], orientation: Orientation) -> Result<ColorImage, PictureFault> {
+    let mut original = ColorImage::default();
+    let mut metadata: PhotoMetadata =
+        decode::decode_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), &mut original)?;
+    let own = metadata.take_orientation();
+    Ok(still::turned(original, if own == Orientation::NoTransforms { orientation } else { own }))
+}
+
+/// Returns the point of the upright picture that (`x`, `y`) of the stored one becomes.
+fn turn_point(x: f32, y: f32, orientation: Orientation) -> Focus {
+    let (x, y) = match orientation {
+        Orientation::NoTransforms => (x, y),
+        Orientation::Rotate90 => (1.0 - y, x),
+        Orientation::Rotate180 => (1.0 - x, 1.0 - y),
+        Orientation::Rotate270 => (y, 1.0 - x),
+        Orientation::FlipHorizontal => (1.0 - x, y),
+        Orientation::FlipVertical => (x, 1.0 - y),
+        Orientation::Rotate90FlipH => (y, x),
+        Orientation::Rotate270FlipH => (1.0 - y, 1.0 - x),
+    };
+    Focus::Point { x, y }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{DynamicImage, GrayImage, Luma};
+
+    use super::*;
+
+    #[test]
+    fn the_focus_turns_with_the_picture() {
+        let (width, height) = (8, 4);
+        for code in 1..=8 {
+            let orientation = Orientation::from_exif(code).unwrap();
+            let mut picture = GrayImage::new(width, height);
+            picture.put_pixel(6, 1, Luma([255]));
+            let mut picture = DynamicImage::ImageLuma8(picture);
+            picture.apply_orientation(orientation);
+            let picture = picture.into_luma8();
+            let (column, row, _) = picture.enumerate_pixels().find(|(.., pixel)| pixel[0] == 255).unwrap();
+            let Focus::Point { x, y } = turn_point(6.5 / 8.0, 1.5 / 4.0, orientation) else { panic!("a point") };
+            let found = (x * picture.width() as f32, y * picture.height() as f32);
+            assert_eq!(found, (column as f32 + 0.5, row as f32 + 0.5), "{orientation:?}");
+        }
+    }
+}
