@@ -17,6 +17,7 @@ use super::file_kind::{self, FileKind};
 use super::heif;
 use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
+use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
 use super::tiff_directory::is_raw_tiff;
 use crate::files::input;
@@ -42,13 +43,6 @@ pub(super) enum EncodedPicture<'a> {
     Png(Box<png::Reader<BufReader<File>>>),
     /// Decoded at once: a JPEG or another format.
     Whole(Box<dyn ImageDecoder + 'a>),
-}
-
-/// The position of a run of pixels: index of the first one in row-major order, and distance to the next.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelRun {
-    pub(super) first: usize,
-    pub(super) step: usize,
 }
 
 impl<'a> EncodedPicture<'a> {
@@ -315,20 +309,6 @@ fn create_png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, Pictu
     let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
     check_size(width, height)?;
     Ok(decoder)
-}
-
-/// Returns the runs of a PNG's rows, in stored order, and the pixels of each.
-fn png_pixel_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<Item = (PixelRun, usize)> {
-    /// First column, column step, first row, row step.
-    const WHOLE: [[usize; 4]; 1] = [[0, 1, 0, 1]];
-    const ADAM7: [[usize; 4]; 7] =
-        [[0, 8, 0, 8], [4, 8, 0, 8], [0, 4, 4, 8], [2, 4, 0, 4], [0, 2, 2, 4], [1, 2, 0, 2], [0, 1, 1, 2]];
-    let passes: &[[usize; 4]] = if is_interlaced { &ADAM7 } else { &WHOLE };
-    // A pass without columns has no rows.
-    passes.iter().filter(move |pass| pass[0] < width).flat_map(move |&[column, step, row, row_step]| {
-        let pixels = (width - column).div_ceil(step);
-        (row..height).step_by(row_step).map(move |row| (PixelRun { first: row * width + column, step }, pixels))
-    })
 }
 
 pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {

@@ -31,6 +31,7 @@ mod pair;
 mod pfm;
 mod photo_metadata;
 pub mod pictures;
+mod pixel_runs;
 mod rgbd;
 mod samples;
 mod tiff_directory;

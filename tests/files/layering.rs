@@ -56,7 +56,7 @@ const DOORS: [(&str, &[&str]); 32] = [
         ],
     ),
     ("rfd", &["window/dialog"]),
-    ("roxmltree", &["recording/embedded"]),
+    ("roxmltree", &["calibration/xml", "recording/embedded"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
     ("saphyr_parser", &["calibration"]),

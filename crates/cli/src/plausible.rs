@@ -174,8 +174,10 @@ fn correlation(values: &[f32], others: &[f32]) -> f64 {
     ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Warns of implausible options of a source, and of its first depth. Returns whether it warned of the latter.
+/// Says what was assumed about a source's files; warns of implausible options, and of its first depth. Returns whether it
+/// warned of the latter.
 pub fn warn_of_source(source: &Source, look: &Look, options: &Options) -> bool {
+    source.findings.notes.iter().for_each(|note| log::note(note));
     warn_of_lens(look);
     warn_of_depth_scale(options.depth.depth_scale);
     let is_unit_known = source.depth_from != DepthOrigin::Units || options.depth.depth_scale.is_some();

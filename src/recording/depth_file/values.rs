@@ -81,7 +81,8 @@ pub(super) fn read(path: &Path) -> Result<Values, PictureFault> {
         }
         [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => npy::parse(&read_whole(file)?),
         [b'P', b'K', 3, 4, ..] => npy::read_archive(file, MAX_FLOATS_BYTES),
-        [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => tiff::read(file),
+        // 43 is BigTIFF.
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => tiff::read(file),
         [0x76, 0x2f, 0x31, 0x01, ..] => exr::read(file),
         [] => Err(PictureFault::Truncated),
         _ => read_codes(path),

@@ -83,7 +83,7 @@ fn millimetres_are_assumed_and_the_largest_value_is_unknown() {
     let scaled = scene.open_with(&Options { depth_scale: Some(1000.0), ..Options::default() }).unwrap();
     assert!(scaled.has_depth_in_units());
     assert_eq!(depth_of(&scaled, 0).unwrap().metres[0], 65.535);
-    let inverse = Options { depth_unit: DepthUnit::Inverse { white_is_far: false }, ..Options::default() };
+    let inverse = Options { depth_unit: DepthUnit::Inverse, ..Options::default() };
     assert!(scene.open_with(&inverse).unwrap().has_relative_depth());
 }
 

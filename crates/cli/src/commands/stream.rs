@@ -17,7 +17,6 @@ use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
 use crate::files::warn_of_leftovers;
 use crate::focus;
-use crate::log;
 use crate::options;
 use crate::plausible;
 use crate::report;
@@ -154,7 +153,6 @@ impl Opened {
             window: false,
         };
         unused::warn_of_unused(&given.settings, &unused);
-        source.findings.notes.iter().for_each(|note| log::note(note));
         if !plausible::warn_of_source(&source, &look, &options)
             && let Some(map) = source.first_depth.as_ref()
         {

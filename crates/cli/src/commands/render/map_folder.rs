@@ -39,7 +39,7 @@ impl<'a> MapFolder<'a> {
     /// Returns the file of a picture.
     ///
     /// # Errors
-    /// There is none, or several.
+    /// The folder has no such file, or several.
     pub fn find(&self, picture: &Path) -> Result<PathBuf, CliError> {
         let stem = picture.file_stem().unwrap_or_default();
         let files = self.suffixes.iter().find_map(|suffix| {

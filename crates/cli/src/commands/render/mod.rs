@@ -77,7 +77,7 @@ pub struct RenderCommand {
     #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
           value_parser = value_parser!(i32).range(-MAX_MASK_PX..=MAX_MASK_PX))]
     mask_grow: i32,
-    /// Turn the outline of --mask into a gradual transition, of so many pixels on both sides
+    /// Turn the outline of --mask into a gradual transition, of this many pixels on both sides
     #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
           value_parser = value_parser!(u16).range(0..=MAX_MASK_PX))]
     mask_feather: u16,
