@@ -137,7 +137,7 @@ pub(super) fn read_depth(
         return Err(match (samples.has_color(), samples.has_alpha()) {
             (true, _) => PictureFault::NotDepth("a colour picture"),
             (false, true) => PictureFault::NotDepth("grey with transparency"),
-            (false, false) => PictureFault::CoarseDepth,
+            (false, false) => PictureFault::NotDepth("an 8-bit grey picture"),
         });
     }
     let found = coded.size();

@@ -281,7 +281,7 @@ fn files_that_are_no_maps_are_named() {
         (b"PK\x03\x04 and then something else".to_vec(), "damaged"),
         (b"\x76\x2f\x31\x01 and then something else".to_vec(), "damaged"),
         (b"II\x2a\0\xff\xff\xff\xff".to_vec(), "the file ends before"),
-        (b"GIF89a".to_vec(), "EXR"),
+        (b"v 1.0 2.0 3.0".to_vec(), "EXR"),
         (Vec::new(), "ends before"),
     ] {
         fs::File::create(&path).unwrap().write_all(&content).unwrap();

@@ -269,7 +269,7 @@ fn a_bomb_is_refused_from_its_header() {
 fn depth_is_16_bit_grey_or_refused() {
     let scene = Scene::with_pairs(3);
     save_grey(&scene.path("depth/1.png"), SIZE, 7);
-    assert_depth_fault(&scene, "an 8-bit grey picture has too few steps for depth");
+    assert_depth_fault(&scene, "an 8-bit grey picture is not depth");
     scene.color("depth/1.png", SIZE, 0);
     assert_depth_fault(&scene, "a colour picture is not depth");
 }
