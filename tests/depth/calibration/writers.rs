@@ -1,5 +1,8 @@
 //! Writes one rig, that of EuRoC, in every format.
 
+// The numbers as the files have them.
+#![allow(clippy::excessive_precision)]
+
 use glam::{DMat3, DVec3};
 
 pub const PINHOLES: [[f64; 4]; 2] = [[458.654, 457.296, 367.215, 248.375], [457.587, 456.134, 379.999, 255.238]];

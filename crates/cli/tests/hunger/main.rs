@@ -164,7 +164,7 @@ fn a_file_is_known_by_its_first_bytes() {
         ("zeros.png", &b""[..], "not a PNG or JPEG file"),
         ("zeros.jpg", b"\xff\xd8\xff\xe0\0\x04", "no frame where one should be"),
         ("png.png", b"\x89PNG\r\n\x1a\n", "damaged"),
-        ("zeros.pfm", b"", "not a grey PFM file"),
+        ("zeros.pfm", b"", "not a PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR file"),
         ("large.pfm", b"Pf\n4 4\n-1\n", "the file has 1073741824 bytes"),
     ] {
         let path = begin(name, start);
