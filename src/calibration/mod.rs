@@ -93,7 +93,7 @@ pub enum LengthUnit {
     Stated,
     /// Metres, assumed.
     AssumedMetres,
-    /// Millimetres, assumed: no rig is [`MAX_BASELINE_M`] wide.
+    /// Millimetres, assumed: no rig is so wide in metres.
     AssumedMillimetres,
 }
 

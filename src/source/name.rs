@@ -292,7 +292,7 @@ impl SourceName {
         let depth = match source.depth_from {
             DepthOrigin::Nothing => "without depth: a map NAME-depth.png beside it would be used",
             DepthOrigin::Networks | DepthOrigin::Plate => "with depth computed from it",
-            _ => "with the depth beside it",
+            _ => "with its own depth",
         };
         Some(format!(
             "{}: a photo, a single still frame, {depth}; only `render` keeps its colour profile, EXIF and XMP",

@@ -51,15 +51,14 @@ pub struct PhotoDepth {
     pub measured: bool,
     /// A short description of its source.
     pub by: String,
-    /// What was assumed about it, a line each.
-    pub notes: Vec<String>,
     /// The photo's sharp original inside it, which is then the picture of the map.
     pub original: Option<ColorImage>,
     /// The focus that the photo was taken with, which replaces `auto`.
     pub focus: Option<FocusRule>,
 }
 
-/// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it.
+/// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it; and what was
+/// assumed or is wrong about it, a line each.
 ///
 /// # Errors
 /// Same as for [`Source::open`].
@@ -68,17 +67,17 @@ pub fn read_default_depth(
     color: &ColorImage,
     options: &Options,
     look: &Look,
-) -> Result<Option<PhotoDepth>, SourceError> {
+) -> Result<(Option<PhotoDepth>, Vec<String>), SourceError> {
     let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
     let measured = source.is_measured();
-    let Source { depth: Some(depth), depth_from: from, networks, findings, .. } = &mut source else { return Ok(None) };
-    let Findings { notes, depth_by, focus, original } = std::mem::take(findings);
+    let Findings { notes, depth_by, focus, original } = std::mem::take(&mut source.findings);
+    let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok((None, notes)) };
     let mut map = DepthMap::default();
     let color = original.as_ref().unwrap_or(color);
     depth
         .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
     let by = networks.take().or(depth_by).unwrap_or_default();
-    Ok(Some(PhotoDepth { map, from: *from, measured, by, notes, original, focus }))
+    Ok((Some(PhotoDepth { map, from: *from, measured, by, original, focus }), notes))
 }
 
 /// Returns the files to read for a photo: the picture, and its depth file if there is one.

@@ -1,5 +1,5 @@
-//! Depth maps of single pictures, as files of any tool or inside photos ([`inside`]): reads the numbers ([`values`]),
-//! decides what they mean ([`meaning`]), and fits the map to its picture ([`fit`]).
+//! Depth maps of single pictures, as files of any tool or inside photos: reads the numbers, decides what they mean, and
+//! fits the map to its picture.
 
 mod exr;
 mod fit;

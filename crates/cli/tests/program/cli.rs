@@ -56,7 +56,7 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
     let cases: [(&[&str], &str); 31] = [
         (
             &["stream", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "--to", "null"],
-            "a folder with a recording, demo or synthetic",
+            "a folder with a recording or pictures, demo or synthetic",
         ),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
         (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
@@ -100,7 +100,7 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
 fn what_a_camera_cannot_do_is_said_in_one_line() {
     let cases: [(&[&str], i32, &str); 6] = [
         (&["--pace", "asap"], 2, "leave --pace out"),
-        (&["--start", "1"], 2, "--loop are for recordings: a camera never ends"),
+        (&["--start", "1"], 2, "--loop are for recordings and videos: a camera never ends"),
         (&["--control", "exposure"], 2, "NAME=VALUE"),
         (&["--format", "MJPEG"], 2, "such as MJPG"),
         (&["--fps", "0"], 2, "from 0.1 to 1000"),

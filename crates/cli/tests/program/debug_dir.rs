@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use bokehcam::frame::DepthMap;
+use bokehcam::recording::still::write_depth;
 use serde_json::Value;
 
 use crate::program::{Home, Ran, json};
@@ -152,7 +154,8 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
 #[test]
 fn what_is_in_focus_all_over_is_still_and_stays_bit_for_bit() {
     let still = Still::new();
-    image::ImageBuffer::from_pixel(96, 56, image::Luma([5000u16])).save(still.path("plane.png")).unwrap();
+    let plane = DepthMap { width: 96, height: 56, metres: vec![1.0; 96 * 56], ..DepthMap::default() };
+    write_depth(&still.path("plane.png"), &plane, 5000.0, false).unwrap();
     still.render("within", &["--depth-map", "plane.png", "--focus", "1"]).done();
     assert_eq!(still.plan("within")["still_share"], 1.0);
     assert!(still.picture("within/still.png").iter().all(|&value| value == 255));

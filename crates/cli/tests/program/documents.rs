@@ -84,6 +84,7 @@ impl Follower {
             copy("portrait/rgb/000000.png", color);
         }
         copy("portrait/depth/000000.png", "depth.png");
+        fs::copy(repository.join("fuzz/seeds/embedded_depth/gdepth.jpg"), follower.path("PHONE.jpg")).unwrap();
         // Any picture is a mask.
         copy("portrait/rgb/000000.png", "MASK.png");
         let mut snapshot = png::Encoder::new(fs::File::create(follower.path("NAME.png")).unwrap(), 1, 1);

@@ -12,7 +12,7 @@ use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
-use bokehcam::recording::depth_file::DepthFile;
+use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
 use bokehcam::recording::{PhotoMetadata, snapshot, still};
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
@@ -70,12 +70,12 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
 
 /// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
 fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
-    let found = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
-    let Some(PhotoDepth { map, from, measured, by, notes, original, focus }) = found else { return Ok(()) };
+    let (found, notes) = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
+    notes.iter().for_each(|note| log::note(note));
+    let Some(PhotoDepth { map, from, measured, by, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {
         plausible::warn_of_subject(None, &map, None);
     }
-    notes.iter().for_each(|note| log::note(note));
     input.found = Some(FoundDepth { measured, by, focus });
     input.color = original.unwrap_or_else(|| std::mem::take(&mut input.color));
     input.depth_from = from;
@@ -136,7 +136,11 @@ fn read_depth(
     let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, color.size())?;
     let origin = DepthOrigin::from(distances);
     if origin.is_relative() {
-        source::reject_metric_look(look, &format!("{} has relative depth, which gives", file.display()))?;
+        let hint = match command.depth.depth_unit {
+            Some(DepthUnit::Inverse) => "",
+            _ => " (disparity becomes metres by `depth --metres`)",
+        };
+        source::reject_metric_look(look, &format!("{} has relative depth{hint}, which gives", file.display()))?;
     }
     notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
     Ok((map, origin))

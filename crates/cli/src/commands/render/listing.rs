@@ -44,7 +44,9 @@ pub(super) fn is_many(images: &[PathBuf], out: &Path) -> bool {
 pub(super) fn list_pictures(images: &[PathBuf], out: &Path) -> Result<Vec<Picture>, CliError> {
     if !is_folder(out) && (out.exists() || still::photo_format(out).is_ok()) {
         let out = out.display();
-        return Err(CliError::Usage(format!("--out {out}: many pictures need a folder, such as --out results/")));
+        return Err(CliError::Usage(format!(
+            "--out {out}: many pictures need a folder, such as --out results/; a depth map is given by --depth-map FILE"
+        )));
     }
     let (mut paths, mut seen) = (Vec::new(), HashSet::new());
     for image in images {

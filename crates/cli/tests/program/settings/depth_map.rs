@@ -160,3 +160,41 @@ fn the_folder_of_the_result_is_made() {
     home.run(&["render", "photo.png", "--effect", "none", "--out", "a/b/out.png"]).done();
     assert!(home.path("a/b/out.png").is_file());
 }
+
+#[test]
+fn a_photo_of_a_phone_is_blurred_by_the_depth_inside_it() {
+    let home = Home::new();
+    let picture = |path: &str| still::read_color(&home.path(path)).unwrap();
+    for (file, kind) in [("gdepth", "GDepth"), ("dynamic", "Dynamic Depth"), ("apple", "Apple")] {
+        let photo = format!("{file}.jpg");
+        let seeds = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/seeds/embedded_depth");
+        fs::copy(std::path::Path::new(seeds).join(&photo), home.path(&photo)).unwrap();
+        let ran = home.run(&["render", &photo, "--out", "r.png", "--force", "--backend", "cpu"]);
+        assert!(ran.done().contains(&format!("depth by {photo} itself ({kind})")), "{}", ran.stderr);
+        let original = "the original before the phone's own blur is inside, and is used";
+        assert_eq!(ran.stderr.contains(original), file != "apple", "{}", ran.stderr);
+        assert_eq!(ran.stderr.contains("the focus is that of the photo"), file == "gdepth", "{}", ran.stderr);
+        let ran = home.run(&["stream", &photo, "--to", "s/", "--force", "--backend", "cpu"]);
+        assert!(ran.done().contains("with its own depth"), "{}", ran.stderr);
+        assert!(picture("r.png") == picture("s/000000.png"), "{file}");
+        for map in ["map.pfm", "map.png"] {
+            let ran = home.run(&["depth", &photo, "--out", map, "--force"]);
+            assert!(ran.done().contains(kind), "{}", ran.stderr);
+            home.run(&["render", &photo, "--depth-map", map, "--out", "m.png", "--force", "--backend", "cpu"]).done();
+        }
+        home.run(&["depth", &photo, "--out", &photo, "--force"]).refused(2, &["--out FILE ends with .pfm or .png"]);
+        // Depth whose end is cut off is said, and the photo is still one.
+        let whole = fs::read(home.path(&photo)).unwrap();
+        fs::write(home.path("cut.jpg"), &whole[..whole.len() - 200]).unwrap();
+        let ran = home.run(&["render", "cut.jpg", "--out", "c.png", "--force", "--backend", "cpu"]);
+        assert_eq!(
+            ran.stderr.contains("depth inside (Dynamic Depth) cannot be read"),
+            file == "dynamic",
+            "{}",
+            ran.stderr
+        );
+    }
+    let home = home.with_photo();
+    home.run(&["depth", "photo.png", "--out", "no.pfm"]).refused(2, &["photo.png: there is no depth inside"]);
+    home.run(&["depth", "photo.png", "--metres", "--out", "no.pfm"]).refused(2, &["two pictures"]);
+}

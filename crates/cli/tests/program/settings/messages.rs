@@ -133,7 +133,7 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
         (&["render", "photo.png", "depth.png", "--out", "o.png"], 2, "--depth-map FILE"),
         (&["render", "photo.png", "--out", "o.png", "--backend", "cuda"], 2, "[possible values: auto, gpu, cpu]"),
         (&["render", "photo.png", "--out", "o.png", "--depth", "mate"], 2, "did you mean matte?"),
-        (&["render", "photo.png", "--out", "o.png", "--depth-unit", "mm"], 2, "--depth-scale 1000"),
+        (&["render", "photo.png", "--out", "o.png", "--depth-unit", "cm"], 2, "millimetres, scale:N"),
         (&["render", "text.png", "--out", "o.png"], 1, "text.png: not a PNG or JPEG file"),
         (&["render", "gone.png", "--out", "o.png"], 1, "gone.png: there is no such file"),
         (&["config", "dump", "--config", "gone.toml"], 1, "gone.toml: there is no such file"),
@@ -159,22 +159,12 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
 #[test]
 fn all_warnings_look_alike() {
     let home = Home::new().with_photo();
-    home.run(&["depth", "photo.png", "photo.png", "--max-disparity", "16", "--out", "d.pfm", "--backend", "cpu"])
-        .done();
-    let ran = home.run(&[
-        "render",
-        "photo.png",
-        "--depth-map",
-        "d.pfm",
-        "--out",
-        "o.png",
-        "--backend",
-        "cpu",
-        "--follow",
-        "2",
-    ]);
+    fs::create_dir(home.path("pictures")).unwrap();
+    fs::copy(home.path("photo.png"), home.path("pictures/1.png")).unwrap();
+    let ran =
+        home.run(&["stream", "pictures", "--to", "null", "--backend", "cpu", "--effect", "blur", "--tilt", "0.5"]);
     let warnings: Vec<&str> =
-        ran.done().lines().filter(|line| line.contains("without a scale") || line.contains("--follow")).collect();
+        ran.done().lines().filter(|line| line.contains("without lists") || line.contains("--tilt")).collect();
     assert_eq!(warnings.len(), 2, "{}", ran.stderr);
     assert!(warnings.iter().all(|line| line.starts_with("warning: ")), "{}", ran.stderr);
 }

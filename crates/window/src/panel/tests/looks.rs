@@ -144,7 +144,7 @@ fn pictures() {
             let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
             state.transport = Some(Transport { frame: 280, frames: 738, time_ns, length_ns });
             state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
-            state.note("holiday.jpg: a photo, a single still frame, with the depth beside it");
+            state.note("holiday.jpg: a photo, a single still frame, with its own depth");
         });
     }
     shot("depth", Theme::Dark, &|state| {
