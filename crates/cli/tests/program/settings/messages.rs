@@ -137,7 +137,7 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
         (&["render", "text.png", "--out", "o.png"], 1, "text.png: not a PNG or JPEG file"),
         (&["render", "gone.png", "--out", "o.png"], 1, "gone.png: there is no such file"),
         (&["config", "dump", "--config", "gone.toml"], 1, "gone.toml: there is no such file"),
-        (&["render", "photo.png", "--out", "o.png", "--depth-map", "photo.png"], 1, "--depth-unit inverse"),
+        (&["render", "photo.png", "--out", "o.png", "--depth-map", "photo.png"], 1, "colours have no order"),
         (&["stream", "clip.mp4", "--to", "null"], 1, "ffmpeg"),
         (&["stream", "https://a.org/clip.mp4", "--to", "null"], 2, "ffmpeg -i 'https://a.org/clip.mp4'"),
         (&["record", "demo", "--to", "rec.mp4"], 2, "a recording is a folder"),
