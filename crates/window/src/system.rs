@@ -249,7 +249,7 @@ impl Services for System {
         }
         let has_depth = source.has_depth() && !is_declined;
         self.control_values.clear();
-        notes.extend(source_name.describe_photo(&source));
+        notes.extend(source_name.describe_photo(&source).into_iter().chain(source.findings.notes.iter().cloned()));
         self.opened.retain(|choice| choice.name != name);
         self.opened.insert(0, Choice::from_name(&name));
         self.camera = devices::controllable_camera(&source_name);

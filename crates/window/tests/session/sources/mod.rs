@@ -78,7 +78,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let mut watched = Watched::begin(&name, folder.path());
     watched.until("what it is", |told| {
         matches!(told, Update::Note(line) if line.contains("a photo, a single still \
-        frame") && line.contains("depth beside it"))
+        frame") && line.contains("its own depth"))
     });
     let Update::Source(Source::Running(running)) = watched.until("it runs", is_running) else { unreachable!() };
     assert!(running.size == (40, 30) && running.has_depth);
