@@ -120,7 +120,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let text = folder.path().join("text.png");
     std::fs::write(&text, "no picture").unwrap();
     let error = open(&text).err().unwrap();
-    assert!(error.contains("neither a folder nor a photo"), "{error}");
+    assert!(error.contains("neither a folder, a photo nor a video"), "{error}");
 }
 
 #[test]
