@@ -98,6 +98,7 @@ pub enum LengthUnit {
 }
 
 /// A longer translation without a unit is in millimetres.
+#[cfg(feature = "files")]
 const MAX_BASELINE_M: f64 = 2.0;
 /// Baselines that are plausible for a translation without a unit, taken as metres.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.005..=0.5;
@@ -105,6 +106,7 @@ const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.005..=0.5;
 /// centimetres or in squares of the chessboard.
 const MIN_PLAUSIBLE_MM: f64 = 20.0;
 
+#[cfg(feature = "files")]
 impl LengthUnit {
     /// Returns the unit to assume for a translation of this length.
     fn assume(length: f64) -> Self {
