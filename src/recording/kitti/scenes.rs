@@ -106,5 +106,6 @@ fn describe(
         false => format!("--size plays others: {}", others.join(", ")),
     };
     let (dir, played) = (dir.display(), scenes.names.len());
-    tracing::warn!("{dir}: single scenes: the {played} of {count} with {width}x{height} and one calibration; {hint}");
+    let calibration = if scenes.rig.is_some() { " and one calibration" } else { "" };
+    tracing::warn!("{dir}: single scenes: the {played} of {count} with {width}x{height}{calibration}; {hint}");
 }
