@@ -197,9 +197,12 @@ pub fn result_format(path: &Path) -> Option<PhotoFormat> {
     }
 }
 
-/// Returns whether a file is a GIF, by its first bytes.
-pub fn is_gif(path: &Path) -> bool {
-    coded::read_kind(path) == Some(FileKind::Other(ImageFormat::Gif))
+/// Returns whether a file is a photo, by its first bytes. A GIF is a video.
+pub fn is_photo(path: &Path) -> bool {
+    match coded::read_kind(path) {
+        Some(FileKind::Other(format)) => format != ImageFormat::Gif,
+        kind => matches!(kind, Some(FileKind::Png | FileKind::Jpeg | file_kind::HEIC)),
+    }
 }
 
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown, as is depth beyond 65535 units; or

@@ -5,9 +5,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, containers, photo, suggestion, video};
+use super::{DepthOrigin, Frames, Source, SourceError, containers, suggestion, video};
 use crate::capture::{demo, y4m};
-use crate::recording::pictures;
+use crate::recording::{pictures, still};
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -204,7 +204,7 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             Some(y4m::NAME) => Ok(SourceName::Stdin),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
-            _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
+            _ if path.is_file() && still::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
             _ if path.is_file() && containers::is_container(path) => {
                 SourceError::usage_error(containers::describe_conversion(path))
             }

@@ -19,11 +19,6 @@ const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr"
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
-/// Returns whether a file is a photo, by its first bytes. A GIF is a video.
-pub fn is_photo(path: &Path) -> bool {
-    still::result_format(path).is_some() && !still::is_gif(path)
-}
-
 /// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth` or `NAME.depth`, of any
 /// format), or the picture of a snapshot before the blur.
 pub fn is_companion(path: &Path) -> bool {

@@ -113,8 +113,7 @@ impl Meaning {
             }
             Quantity::Inverse => {
                 let is_known = |number: f32| number.is_finite() && is_valid(number);
-                let known = || numbers.iter().copied().filter(|&number| is_known(number));
-                let (low, high) = known().fold((f32::MAX, f32::MIN), |(low, high), n| (low.min(n), high.max(n)));
+                let (low, high) = range_of(numbers.iter().copied().filter(|&number| is_known(number)));
                 let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
                 for number in &mut numbers {
                     let near = (*number - low) * scale;
@@ -140,7 +139,7 @@ impl Meaning {
 /// Returns what is wrong with numbers that would be taken as distances, as nothing else is stated.
 fn check_unclear(values: &Values) -> Option<&'static str> {
     let known = || values.numbers.iter().copied().filter(|&number| number.is_finite());
-    let (low, high) = known().fold((f32::MAX, f32::MIN), |(low, high), n| (low.min(n), high.max(n)));
+    let (low, high) = range_of(known());
     match values.samples {
         Samples::Sixteen => {
             let mut ranges = [false; 256];
@@ -160,6 +159,11 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
         }
         Samples::Eight | Samples::Whole => None,
     }
+}
+
+/// Returns the smallest and the largest of the numbers.
+fn range_of(numbers: impl Iterator<Item = f32>) -> (f32, f32) {
+    numbers.fold((f32::MAX, f32::MIN), |(low, high), number| (low.min(number), high.max(number)))
 }
 
 /// Rejects maps that tell nothing. If the file states its unit, it may be flat, as walls are.

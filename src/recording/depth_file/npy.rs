@@ -4,6 +4,7 @@
 use std::fs::File;
 use std::io::Read;
 
+use exr::prelude::f16;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
@@ -113,7 +114,7 @@ impl Header {
         }
         let whole = u64::from_le_bytes(ordered);
         match (self.kind, self.bytes) {
-            (b'f', 2) => half_to_float(whole as u16),
+            (b'f', 2) => f16::from_bits(whole as u16).to_f32(),
             (b'f', 4) => f32::from_bits(whole as u32),
             (b'f', _) => f64::from_bits(whole) as f32,
             (b'i', 2) => f32::from(whole as i16),
@@ -122,18 +123,6 @@ impl Header {
             _ => whole as f32,
         }
     }
-}
-
-/// Converts a number of 16 bits (IEEE 754 binary16).
-pub(super) fn half_to_float(bits: u16) -> f32 {
-    let (sign, exponent, fraction) = (bits >> 15, bits >> 10 & 31, f32::from(bits & 1023));
-    let size = match exponent {
-        0 => fraction * 2.0_f32.powi(-24),
-        31 if fraction == 0.0 => f32::INFINITY,
-        31 => f32::NAN,
-        _ => (1.0 + fraction / 1024.0) * 2.0_f32.powi(i32::from(exponent) - 15),
-    };
-    if sign == 1 { -size } else { size }
 }
 
 /// Reads the map in an archive of arrays, each of at most `max_bytes`.

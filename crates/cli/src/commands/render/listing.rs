@@ -94,7 +94,7 @@ fn find_pattern(image: &Path) -> Option<&str> {
 
 /// Returns the pictures of a file, folder or pattern; those of the last two are sorted by name.
 fn expand(image: &Path) -> Result<Vec<PathBuf>, CliError> {
-    let is_picture = |path: &Path| path.is_file() && (still::photo_format(path).is_ok() || photo::is_photo(path));
+    let is_picture = |path: &Path| path.is_file() && (still::photo_format(path).is_ok() || still::is_photo(path));
     if image.is_dir() {
         let entries = fs::read_dir(image).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let is_hidden = |entry: &fs::DirEntry| entry.file_name().as_encoded_bytes().starts_with(b".");
