@@ -82,7 +82,7 @@ fn a_photo_or_folder_dropped_on_the_window_is_opened_and_nonsense_changes_nothin
     photo.rgb.as_chunks_mut::<3>().0.fill([200, 40, 20]);
     bokehcam::recording::still::write_color(files.path().join("red one.png").as_ref(), &photo, false).unwrap();
     drop_on(&window, &[path("letter.txt")]);
-    until("it is told", PATIENCE, || program.said().contains("neither a folder nor a photo"));
+    until("it is told", PATIENCE, || program.said().contains("neither a folder, a photo nor a video"));
     assert!(window.title().contains("synthetic"), "{}", window.title());
     drop_on(&window, &[path("red%20one.png"), path("letter.txt")]);
     until("the photo", PATIENCE, || window.title().contains("red one.png"));
