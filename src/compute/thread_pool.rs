@@ -5,13 +5,16 @@
 //! they never use it afterwards, even after a panic.
 #![allow(unsafe_code)]
 
+mod placement;
 pub mod wavefront;
 
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::thread::{self, JoinHandle, Thread};
+use std::thread::{self, JoinHandle};
+
+use placement::{Placement, current_cpu};
 
 /// One part of a pass: called with the numbers of the worker and of the part.
 type Work<'a> = &'a (dyn Fn(usize, usize) + Sync + 'a);
@@ -31,6 +34,8 @@ struct Shared {
     panicked: AtomicBool,
     stop: AtomicBool,
     started: AtomicUsize,
+    /// Of each worker but the caller.
+    placements: Box<[Placement]>,
 }
 
 #[derive(Clone, Copy)]
@@ -79,6 +84,7 @@ impl ThreadPool {
             panicked: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             started: AtomicUsize::new(0),
+            placements: (1..threads.max(1)).map(|_| Placement::new()).collect(),
         });
         let workers = (1..threads.max(1))
             .map_while(|k| {
@@ -165,11 +171,12 @@ impl ThreadPool {
         // SAFETY: the gate is closed and no worker is at work (see the wait below), so no other thread touches the
         // cell.
         unsafe { *shared.work.get() = Some(Pass { work, parts }) };
+        let own = current_cpu();
+        shared.placements.iter().take(parts - 1).for_each(|placement| placement.keep_off(own));
         // Release: workers that see the gate open also see the pass.
         let closed = shared.gate.load(Ordering::Relaxed);
         shared.gate.store((closed & !(EPOCH - 1)).wrapping_add(EPOCH) | OPEN, Ordering::Release);
-        let helpers = self.workers.iter().take(parts - 1);
-        helpers.map(JoinHandle::thread).for_each(Thread::unpark);
+        self.workers.iter().take(parts - 1).for_each(|worker| worker.thread().unpark());
 
         shared.run_parts(0, Pass { work, parts });
         shared.gate.fetch_and(!OPEN, Ordering::Relaxed);
@@ -190,6 +197,8 @@ impl ThreadPool {
 impl Shared {
     /// Runs a worker's thread: enters each pass once, if it is awake in time, until the pool is dropped.
     fn run_worker(&self, worker: usize) {
+        let placement = &self.placements[worker - 1];
+        placement.start();
         self.started.fetch_add(1, Ordering::Relaxed);
         let mut last_epoch = 0;
         loop {
@@ -203,13 +212,14 @@ impl Shared {
                     break gate;
                 }
                 turns += 1;
-                if turns < SPINS { std::hint::spin_loop() } else { thread::park() }
+                if turns < SPINS { std::hint::spin_loop() } else { placement.sleep() }
             };
             // Acquire pairs with the release in `run_workers`. A failure means that the gate changed: try again.
             if self.gate.compare_exchange(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
                 continue;
             }
             last_epoch = gate / EPOCH;
+            placement.allow_again();
             // SAFETY: entered through the open gate, so `run_workers` neither writes the cell nor returns until this
             // worker leaves.
             if let Some(pass) = unsafe { *self.work.get() } {

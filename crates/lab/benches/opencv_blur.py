@@ -6,7 +6,8 @@ Needs numpy and opencv-python-headless, and a built bokehcam (--bin, default tar
   opencv_blur.py [--image FILE] [--size 1280x720] [--radii 16,32] [--rounds 7] [--quality LEVEL]
 
 Both sides blur in linear light with a hard disc (--rim 0). OpenCV gets float32 linear light and is timed on the filter
-alone; bokehcam is timed from 8-bit sRGB to 8-bit sRGB. Every side is timed in turn, in the same run, on one thread and
+alone; bokehcam is timed from 8-bit sRGB to 8-bit sRGB: in `bench`, one frame after another, and live, as the blur stage
+of a stream in real time that blurs every frame anew. Every side is timed in turn, in the same run, on one thread and
 on two (OpenCV's filters use one whatever is allowed). Nearness to the exact disc: PSNR of the 8-bit results against the
 8-bit result of an exact area-sampled disc, and for a lone light on grey the ripple of its plateau and the lowest value
 around it, in percent of the plateau's height.
@@ -69,6 +70,18 @@ def render(binary, image, radius_px, quality):
         return cv2.imread(out)
 
 
+def live_ms(binary, image, radius_px, quality, threads):
+    """Median of the blur stage of a stream in real time, without kept parts."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, report = os.path.join(folder, 'in.png'), os.path.join(folder, 'report.json')
+        cv2.imwrite(source, image)
+        subprocess.run([binary, 'stream', source, '--effect', 'blur', '--coc-at-infinity', str(radius_px), '--rim', '0',
+                        '--backend', 'cpu', '--quality', quality, '--threads', str(threads), '--reuse', 'off', '--pace',
+                        'realtime', '--loop', '--frames', '60', '--to', 'null', '--report', report, '-q'], check=True)
+        with open(report) as file:
+            return json.load(file)['stages_ms']['blur']['p50']
+
+
 def light_profile(code, background, radius_px):
     """Ripple of the plateau and the lowest value beside it, in percent of the plateau's height over the background."""
     light = linear(code[..., 1].astype(np.float32) / 255) - background
@@ -121,20 +134,24 @@ def main():
             bench = [args.bin, 'bench', '--effect', 'blur', '--rim', '0', '--backend', 'cpu', '--sizes', args.size, '--coc',
                      str(radius_px), '--quality', args.quality, '--threads', str(threads), '--frames', '30', '--json']
             times['bokehcam'] = json.loads(subprocess.run(bench, check=True, capture_output=True).stdout)['p50_ms']
+            times['bokehcam live'] = live_ms(args.bin, image, radius_px, args.quality, threads)
             for name, ms in times.items():
                 rows.setdefault(name, []).append(ms)
+        print(f'\nradius {radius_px:g} px, {args.size}, live: {rows["bokehcam live"][0]:.1f} and '
+              f'{rows["bokehcam live"][1]:.1f} ms on one and two threads')
         results = {'filter2D': (truth, srgb8(exact(spot_light))),
                    'rank-4 sepFilter2D': (srgb8(low_rank(light)), srgb8(low_rank(spot_light))),
                    'bokehcam': (render(args.bin, image, radius_px, args.quality),
                                 render(args.bin, spot, radius_px, args.quality))}
-        print(f'\nradius {radius_px:g} px, {args.size}      1 thread   2 threads   PSNR to exact   ripple   lowest')
+        print(f'radius {radius_px:g} px, {args.size}      1 thread   2 threads   PSNR to exact   ripple   lowest')
         for name, (picture, lone) in results.items():
             ripple, lowest = light_profile(lone, background, radius_px)
             print(f'{name:28s} {rows[name][0]:8.1f} ms {rows[name][1]:8.1f} ms   {psnr(truth, picture):8.1f} dB'
                   f'   {ripple:6.1f} %  {lowest:6.1f} %')
         best = [min(rows['filter2D'][k], rows['rank-4 sepFilter2D'][k]) for k in (0, 1)]
-        print(f'the better of OpenCV over bokehcam: {best[0] / rows["bokehcam"][0]:.1f} times on one thread, '
-              f'{best[1] / rows["bokehcam"][1]:.1f} on two')
+        for name in ('bokehcam', 'bokehcam live'):
+            print(f'the better of OpenCV over {name}: {best[0] / rows[name][0]:.1f} times on one thread, '
+                  f'{best[1] / rows[name][1]:.1f} on two')
 
 
 if __name__ == '__main__':

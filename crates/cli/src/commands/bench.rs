@@ -71,6 +71,9 @@ pub struct BenchCommand {
     /// Frames to measure [default: 20, or fewer if they would take more than 2 s]
     #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    /// Let frames arrive at this rate, as in a live stream, instead of one after another: threads sleep in between
+    #[arg(id = "benched_fps", long = "fps", value_name = "N", value_parser = in_range_parser(1.0..=1000.0))]
+    fps: Option<f32>,
     /// Where the blur runs
     #[arg(long, value_parser = options::named_value_parser::<Backend>(), value_name = "WHICH", default_value = "auto")]
     backend: Backend,
@@ -86,7 +89,7 @@ pub struct BenchCommand {
     /// Measure all stages of a stream instead: reading, depth, blur at each quality, and writing for a virtual camera;
     /// from a recording, a photo, `demo` or `synthetic`
     #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name_parser(),
-          conflicts_with_all = ["sizes", "coc", "scene", "passes"])]
+          conflicts_with_all = ["sizes", "coc", "scene", "passes", "benched_fps"])]
     chain: Option<SourceName>,
     #[command(flatten)]
     depth: options::Depth,
@@ -154,7 +157,7 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettin
                     let before = done * u64::from(command.frames.unwrap_or(FRAMES));
                     progress.set_delivered(before);
                     let measured = measure_blur(
-                        command.frames,
+                        &Sampling { frames: command.frames, fps: command.fps },
                         &look,
                         (&color, &depth),
                         (coc_px, quality),
@@ -184,7 +187,14 @@ pub fn run_short_benchmark() -> String {
     let mut table = HEADING.to_owned();
     for backend in [Backend::Auto, Backend::Cpu] {
         let (computing, progress) = (ComputeOptions { backend, ..ComputeOptions::default() }, Progress::silent());
-        match measure_blur(None, &Look::default(), (&frame.0, &frame.1), blur, &computing, (&progress, 0)) {
+        match measure_blur(
+            &Sampling::default(),
+            &Look::default(),
+            (&frame.0, &frame.1),
+            blur,
+            &computing,
+            (&progress, 0),
+        ) {
             Ok(measured) => {
                 table += &measured.format_line(false, false);
                 // `auto` chose the CPU: its row is already there.
@@ -209,10 +219,19 @@ impl BenchCommand {
     }
 }
 
+/// Which frames are measured.
+#[derive(Default)]
+struct Sampling {
+    /// [`FRAMES`], or fewer within [`TIME_LIMIT`], unless given.
+    frames: Option<u32>,
+    /// Rate at which frames arrive; one after another if `None`.
+    fps: Option<f32>,
+}
+
 /// Measures one combination of settings: blurs the same picture repeatedly after a warm-up. `before` is the number of
 /// frames that `progress` has already counted.
 fn measure_blur(
-    frames: Option<u32>,
+    sampling: &Sampling,
     look: &Look,
     (color, depth): (&ColorImage, &DepthMap),
     (coc_px, quality): (f32, Quality),
@@ -241,10 +260,14 @@ fn measure_blur(
     let mut times = Vec::new();
     let mut passes = BTreeMap::<_, Vec<Duration>>::new();
     let began = Instant::now();
-    for frame in 1..=frames.unwrap_or(FRAMES) {
-        let is_over = frames.is_none() && times.len() >= MIN_FRAMES && began.elapsed() > TIME_LIMIT;
+    for frame in 1..=sampling.frames.unwrap_or(FRAMES) {
+        let is_over = sampling.frames.is_none() && times.len() >= MIN_FRAMES && began.elapsed() > TIME_LIMIT;
         if is_over {
             break;
+        }
+        if let Some(fps) = sampling.fps {
+            let arrival = Duration::from_secs_f64(f64::from(frame) / f64::from(fps));
+            std::thread::sleep(arrival.saturating_sub(began.elapsed()));
         }
         progress.set_delivered(before + u64::from(frame));
         let (time, in_passes) = buffers.time_frame(&mut *bokeh, coc)?;

@@ -118,6 +118,15 @@ fn bench_measures_every_combination() {
 }
 
 #[test]
+fn benched_frames_arrive_at_the_given_rate() {
+    let began = std::time::Instant::now();
+    run(&["bench", "--sizes", "17x13", "--backend", "cpu", "--frames", "8", "--fps", "20", "--json"]).done();
+    assert!(began.elapsed() >= std::time::Duration::from_secs(8) / 20);
+    run(&["bench", "--fps", "0"]).refused(2, &["--fps", "from 1 to 1000"]);
+    run(&["bench", "--chain", "--fps", "30"]).refused(2, &["--fps"]);
+}
+
+#[test]
 fn bench_measures_each_stage_of_the_chain() {
     let home = recorded();
     let args = ["bench", "--chain", "recording", "--quality", "draft,balanced", "--frames", "3", "--backend", "cpu"];
