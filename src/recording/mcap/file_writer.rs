@@ -1,6 +1,7 @@
 //! Writes the records of an MCAP file: chunks without compression, with an index of their messages, and a summary.
 //!
-//! The crate `mcap` would do this, too, but brings ten others, and has no part in reading here.
+//! The crate `mcap` does this, too, but brings `binrw`, `enumset`, `bimap` and what they need, and its readers do not fit:
+//! they read every byte of a file to find the times of its pictures.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};

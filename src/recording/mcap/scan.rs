@@ -144,7 +144,7 @@ impl Scanner<'_> {
             let next = content_at.saturating_add(length);
             let is_chunk = head[0] == CHUNK && chunk.is_none() && chunk_end.is_none();
             // No record has the code 0: a file that was not written to its end may go on with zeros.
-            if head[0] == 0 || next > chunk_end.unwrap_or(end) && !is_chunk {
+            if head[0] == 0 || next > chunk_end.unwrap_or(end).min(end) && !is_chunk {
                 let what = if head[0] == 0 { "something that is no record" } else { CUT };
                 let Some(chunk_end) = chunk_end.take().filter(|&chunk_end| chunk_end <= end) else {
                     return Err(Damage::Fault(what.to_owned()));

@@ -124,7 +124,7 @@ impl Archive {
         Ok(bytes)
     }
 
-    /// Returns width and height of a map of `count` depths: in the proportions of the colour picture, or else as stated.
+    /// Returns width and height of a map of `count` depths: in the proportions of the colour picture, else as stated.
     fn find_depth_size(&self, count: usize, color: (u32, u32)) -> Option<(u32, u32)> {
         let is_of = |&(width, height): &(u32, u32)| width as usize * height as usize == count && count > 0;
         let height = (count as f64 * f64::from(color.1) / f64::from(color.0)).sqrt().round() as u32;

@@ -220,6 +220,15 @@ fn a_cut_file_is_played_as_far_as_it_is_whole() {
         }
     }
     assert!(lengths.iter().all(|&count| count > 10), "{lengths:?}");
+    // A picture that is cut does not count, with or without chunks.
+    let own = scene.path("own.mcap");
+    write(&own, false).unwrap().finish().unwrap();
+    let own = fs::read(own).unwrap();
+    for end in (0..own.len()).step_by(own.len() / 200) {
+        if let Ok(recording) = open(&scene, "take.mcap", &own[..end], &Options::default()) {
+            (0..recording.len()).for_each(|frame| drop(color_of(&recording, frame).unwrap()));
+        }
+    }
     // A compressed chunk is whole or lost.
     for file in [LZ4, ZSTD] {
         assert_says(open(&scene, "take.mcap", &file[..file.len() / 3], &Options::default()), &["ends within a record"]);
