@@ -14,14 +14,14 @@ mod texts;
 pub use calibrations::{calibration, depth_calibration};
 pub use camera::{mjpeg, raw_pixels};
 pub use pictures::{depth_map, embedded_depth, picture, snapshot};
-pub use recordings::recording;
+pub use recordings::{recording, recording_file};
 pub use texts::{command_line, settings};
 
 /// A fuzz target: accepts any bytes, and panics on a broken guarantee.
 pub type Target = fn(&[u8]);
 
 /// Every target with its name, which is also that of its folder of seeds.
-pub const TARGETS: [(&str, Target); 11] = [
+pub const TARGETS: [(&str, Target); 12] = [
     ("calibration", calibration),
     ("command_line", command_line),
     ("depth_calibration", depth_calibration),
@@ -31,6 +31,7 @@ pub const TARGETS: [(&str, Target); 11] = [
     ("picture", picture),
     ("raw_pixels", raw_pixels),
     ("recording", recording),
+    ("recording_file", recording_file),
     ("settings", settings),
     ("snapshot", snapshot),
 ];

@@ -1,4 +1,4 @@
-//! Target for the frame lists and calibrations of recordings.
+//! Targets for recordings: frame lists and calibrations, and recordings in a single file.
 
 use std::cell::Cell;
 
@@ -45,6 +45,15 @@ pub fn recording(data: &[u8]) {
         ..Options::default()
     };
     match Recording::open(&file_path(folder), &options) {
+        Ok(recording) => check_recording(&recording),
+        Err(error) => assert_one_line(error),
+    }
+}
+
+/// Opens a recording in a single file: MCAP if it begins so, else Record3D.
+pub fn recording_file(data: &[u8]) {
+    let path = write_file(if data.starts_with(b"\x89MCAP") { "take.mcap" } else { "take.r3d" }, data);
+    match Recording::open(&path, &Options::default()) {
         Ok(recording) => check_recording(&recording),
         Err(error) => assert_one_line(error),
     }

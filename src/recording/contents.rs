@@ -1,11 +1,12 @@
 //! The common form of all layouts: frames whose pictures are still on disk.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::decode::DepthUnits;
+use super::container::Container;
+use super::decode::{self, DepthUnits};
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
@@ -17,8 +18,8 @@ pub(super) struct Layout {
     pub(super) name: &'static str,
     /// The files that identify it, for messages.
     pub(super) expected_files: &'static str,
-    /// Whether the folder has this layout.
-    pub(super) matches_folder: fn(&Path) -> bool,
+    /// Whether a folder or file has this layout.
+    pub(super) matches: fn(&Path) -> bool,
     /// Reads its lists and calibrations.
     pub(super) open: fn(&RecordingFolder, &Options) -> Result<Contents, RecordingError>,
 }
@@ -38,6 +39,8 @@ pub(super) struct Contents {
     pub(super) is_chosen_by_size: bool,
     /// A folder of depth maps outside the recording's, with all links resolved.
     pub(super) maps_root: Option<PathBuf>,
+    /// The pictures of a recording in a single file; those of the frames then only have names for messages.
+    pub(super) container: Option<Box<dyn Container>>,
 }
 
 /// A frame of a list. Known times increase strictly.
@@ -184,4 +187,30 @@ impl PictureSource {
             None => RecordingError::Picture { path: dir.join(file), fault },
         }
     }
+}
+
+/// Returns the size of the first colour picture with a readable header, or else the error of the first one.
+pub(super) fn read_first_size<'a>(
+    folder: &RecordingFolder,
+    colors: impl Iterator<Item = &'a PictureSource>,
+) -> Result<(u32, u32), RecordingError> {
+    let (mut first_error, mut locator) = (None, Locator::new(folder));
+    // A list may name an unreadable file many times: open it once.
+    let mut unreadable = HashSet::new();
+    for source in colors {
+        let size = locator.locate(source).and_then(|path| {
+            if unreadable.contains(&path) {
+                return Ok(None);
+            }
+            let header = decode::read_header(&path).map_err(|fault| source.error(&folder.dir, fault));
+            unreadable.insert(path);
+            header.map(|(size, _)| Some(size))
+        });
+        match size {
+            Ok(Some(size)) => return Ok(size),
+            Ok(None) => {}
+            Err(error) => first_error = first_error.or(Some(error)),
+        }
+    }
+    Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: folder.dir.clone() }))
 }

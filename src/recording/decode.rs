@@ -15,10 +15,10 @@ use crate::frame::{ColorImage, DepthMap, GrayImage};
 /// Working memory for decoding, kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// The content of a file that must be read completely: a JPEG or PFM.
-    file: Vec<u8>,
+    /// The content of a file that must be read completely: a JPEG or PFM, or a part of a recording's file.
+    pub(super) file: Vec<u8>,
     /// One row of a PNG, or all pixels of a JPEG.
-    pixels: Vec<u8>,
+    pub(super) pixels: Vec<u8>,
     /// A right picture before its conversion to luma.
     right: ColorImage,
 }
@@ -67,11 +67,18 @@ pub(super) fn read_color(
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let found = coded.size();
-    if let Some(expected) = expected.filter(|&expected| expected != found) {
-        return Err(PictureFault::Size { found, expected });
-    }
+    expected.map_or(Ok(()), |expected| check_color_size(coded.size(), expected))?;
     decode_color(coded, &mut scratch.pixels, into)
+}
+
+/// Rejects a picture of another size than `expected`.
+pub(super) fn check_color_size(found: (u32, u32), expected: (u32, u32)) -> Result<(), PictureFault> {
+    if found == expected { Ok(()) } else { Err(PictureFault::Size { found, expected }) }
+}
+
+/// Rejects a depth map that does not cover a picture of `color` pixels.
+pub(super) fn check_depth_size(found: (u32, u32), color: (u32, u32)) -> Result<(), PictureFault> {
+    if depth_covers(found, color) { Ok(()) } else { Err(PictureFault::DepthSize { found, color }) }
 }
 
 /// Decodes an opened picture as [`read_color`] does. `pixels` is working memory.
@@ -132,6 +139,17 @@ pub(super) fn read_depth(
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    decode_depth(coded, units, color_size, &mut scratch.pixels, into)
+}
+
+/// Decodes an opened picture as [`read_depth`] does. `pixels` is working memory.
+pub(super) fn decode_depth(
+    coded: EncodedPicture,
+    units: DepthUnits,
+    color_size: Option<(u32, u32)>,
+    pixels: &mut Vec<u8>,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
     let samples = coded.samples();
     if !samples.is_depth() {
         return Err(match (samples.has_color(), samples.has_alpha()) {
@@ -141,12 +159,10 @@ pub(super) fn read_depth(
         });
     }
     let found = coded.size();
-    if let Some(color) = color_size.filter(|&color| !depth_covers(found, color)) {
-        return Err(PictureFault::DepthSize { found, color });
-    }
+    color_size.map_or(Ok(()), |color| check_depth_size(found, color))?;
     into.resize(found.0, found.1);
     let arch = Arch::new();
-    coded.decode_runs(&mut scratch.pixels, |run, row| {
+    coded.decode_runs(pixels, |run, row| {
         let (values, metres) = (row.as_chunks().0, &mut into.metres[run.first..]);
         if run.step == 1 {
             arch.dispatch(ConvertToMetres { values, units, metres });
@@ -161,7 +177,7 @@ pub(super) fn read_depth(
 impl DepthUnits {
     /// Converts a big-endian value to metres; 0 if it is unknown.
     #[inline(always)]
-    fn to_metres(self, value: [u8; 2]) -> f32 {
+    pub(super) fn to_metres(self, value: [u8; 2]) -> f32 {
         // 0 is unknown in any case.
         let (value, invalid) = (u16::from_be_bytes(value), self.invalid.unwrap_or(0));
         let depth_m = f32::from(value) / self.scale;
@@ -198,9 +214,7 @@ pub(super) fn read_inverse_depth(
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let found = coded.size();
-    if !depth_covers(found, color) {
-        return Err(PictureFault::DepthSize { found, color });
-    }
+    check_depth_size(found, color)?;
     into.resize(found.0, found.1);
     decode_grey(coded, &mut scratch.pixels, &mut into.metres)?;
     for value in &mut into.metres {

@@ -91,6 +91,13 @@ pub enum RecordingError {
          '{0}/rgb.mp4' -fps_mode passthrough -start_number 0 '{0}/rgb/%06d.png'", dir.display()
     )]
     Film { dir: PathBuf },
+    /// A recording in a single file cannot be played.
+    #[error("{}: {what}", path.display())]
+    File {
+        path: PathBuf,
+        /// The fault, and what to do.
+        what: String,
+    },
     /// The file that states the depth scale is invalid.
     #[error("{}: {what}; correct it, or give the units per metre with --depth-scale", file.display())]
     StatedScale {

@@ -1,18 +1,21 @@
 //! Recordings on disk, read and written frame by frame, and single pictures ([`still`], [`snapshot`]).
 //!
 //! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
-//! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists.
+//! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists; [`mcap`]
+//! (which can be written) and `record3d` are single files.
 
 pub mod depth_file;
 #[doc(hidden)]
 pub mod embedded;
 pub mod geometry;
+pub mod mcap;
 pub mod snapshot;
 pub mod still;
 pub mod tum;
 
 mod calib;
 mod coded;
+mod container;
 mod contents;
 mod decode;
 mod encode;
@@ -21,6 +24,7 @@ mod euroc;
 mod fault;
 mod file_kind;
 mod folder;
+mod frame_sequence;
 mod heif;
 mod jpeg;
 mod kitti;
@@ -32,14 +36,15 @@ mod pfm;
 mod photo_metadata;
 pub mod pictures;
 mod pixel_runs;
+mod record3d;
 mod rgbd;
 mod samples;
 mod tiff_directory;
 mod timeline;
 mod unit;
+mod writer;
 mod xmp;
 
-use std::collections::HashSet;
 use std::path::Path;
 
 pub use decode::Scratch;
@@ -48,15 +53,25 @@ pub use error::RecordingError;
 pub use fault::{GeometryFault, LineFault, PictureFault};
 pub use options::Options;
 pub use photo_metadata::PhotoMetadata;
+pub use writer::RecordingWriter;
 
 use crate::calibration::StereoCalibration;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::optics::StereoRig;
-use contents::{DepthFormat, Layout, Locator, PictureSource, RecordingFolder};
+use container::Container;
+use contents::{DepthFormat, Layout, PictureSource, RecordingFolder};
 
 /// The supported layouts, in order of detection.
-const LAYOUTS: [Layout; 6] =
-    [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT, rgbd::LAYOUT, pictures::LAYOUT];
+const LAYOUTS: [Layout; 8] = [
+    mcap::LAYOUT,
+    record3d::LAYOUT,
+    tum::LAYOUT,
+    euroc::LAYOUT,
+    kitti::LAYOUT,
+    middlebury::LAYOUT,
+    rgbd::LAYOUT,
+    pictures::LAYOUT,
+];
 
 /// Maximum width and height; larger pictures are rejected by their header, before memory is allocated. Reading the
 /// largest takes at most four times the 192 MiB of its RGB.
@@ -93,6 +108,8 @@ pub enum StereoGeometry {
 pub struct Recording {
     layout: &'static str,
     folder: RecordingFolder,
+    /// The pictures, if they are in a single file.
+    container: Option<Box<dyn Container>>,
     frames: Vec<Frame>,
     size: (u32, u32),
     period_ns: u64,
@@ -114,8 +131,8 @@ struct Frame {
 }
 
 impl Recording {
-    /// Opens the recording in the folder `dir`, or the pictures of a pattern such as `DIR/IMG_%04d.jpg`. Reads its
-    /// lists, and the headers of pictures where needed.
+    /// Opens the recording in the folder or file `dir`, or the pictures of a pattern such as `DIR/IMG_%04d.jpg`. Reads
+    /// its lists, and the headers of pictures where needed.
     ///
     /// # Errors
     /// The folder is not a recording, or a list is missing or empty; no depth map or right picture pairs with a colour
@@ -133,13 +150,17 @@ impl Recording {
         let (layout, contents) = match pattern_folder {
             Some(_) => (&pictures::LAYOUT, pictures::open_pattern(&folder, path, options)?),
             None => {
-                let layout = LAYOUTS.iter().find(|layout| (layout.matches_folder)(dir)).ok_or_else(not_a_recording)?;
+                let layout = LAYOUTS.iter().find(|layout| (layout.matches)(dir)).ok_or_else(not_a_recording)?;
                 (layout, (layout.open)(&folder, options)?)
             }
         };
 
         folder.maps_root = contents.maps_root;
-        let size = read_first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
+        let sources = contents.frames.iter().map(|frame| &frame.color);
+        let size = match &contents.container {
+            Some(container) => container::read_first_size(container.as_ref(), dir, sources)?,
+            None => contents::read_first_size(&folder, sources)?,
+        };
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
         let frames: Vec<_> = listed
@@ -148,6 +169,7 @@ impl Recording {
         Ok(Self {
             layout: layout.name,
             folder,
+            container: contents.container,
             size,
             period_ns: timeline::median_period_ns(frames.iter().map(|frame| frame.time_ns)),
             frames,
@@ -209,6 +231,11 @@ impl Recording {
         self.is_chosen_by_size
     }
 
+    /// Returns whether [`Options::topics`] can choose its pictures.
+    pub fn has_topics(&self) -> bool {
+        self.layout == mcap::LAYOUT.name
+    }
+
     /// Returns whether its depth is in the units of [`Options::depth_scale`], and not in units that it states itself.
     pub fn has_depth_in_units(&self) -> bool {
         matches!(self.depth, Some(DepthFormat::Units(_)))
@@ -241,6 +268,10 @@ impl Recording {
     /// list is faulty; there is no such frame. The content of `into` is then unspecified.
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
+        if let Some(container) = &self.container {
+            let read = container.read_color(index, self.size, scratch, into);
+            return read.map_err(|fault| source.error(&self.folder.dir, fault));
+        }
         let path = self.folder.locate(source)?;
         decode::read_color(&path, Some(self.size), scratch, into)
             .map(drop)
@@ -258,6 +289,10 @@ impl Recording {
         let frame = self.frame(index)?;
         // Without a depth map, the line of the colour picture is at fault.
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
+        if let Some(container) = &self.container {
+            let read = container.read_depth(index, self.size, scratch, into);
+            return read.map_err(|fault| source.error(&self.folder.dir, fault));
+        }
         let path = self.folder.locate(source)?;
         let read = match form {
             DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
@@ -290,35 +325,14 @@ impl Recording {
     }
 }
 
+/// Returns whether a file is a recording by itself.
+pub fn is_recording_file(path: &Path) -> bool {
+    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT].iter().any(|layout| (layout.matches)(path))
+}
+
 /// Returns the files that identify each layout, for messages.
 fn describe_expected_files() -> String {
     LAYOUTS.map(|layout| format!("{} ({})", layout.expected_files, layout.name)).join(", ")
-}
-
-/// Returns the size of the first colour picture with a readable header, or else the error of the first one.
-fn read_first_size<'a>(
-    folder: &RecordingFolder,
-    colors: impl Iterator<Item = &'a PictureSource>,
-) -> Result<(u32, u32), RecordingError> {
-    let (mut first_error, mut locator) = (None, Locator::new(folder));
-    // A list may name an unreadable file many times: open it once.
-    let mut unreadable = HashSet::new();
-    for source in colors {
-        let size = locator.locate(source).and_then(|path| {
-            if unreadable.contains(&path) {
-                return Ok(None);
-            }
-            let header = decode::read_header(&path).map_err(|fault| source.error(&folder.dir, fault));
-            unreadable.insert(path);
-            header.map(|(size, _)| Some(size))
-        });
-        match size {
-            Ok(Some(size)) => return Ok(size),
-            Ok(None) => {}
-            Err(error) => first_error = first_error.or(Some(error)),
-        }
-    }
-    Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: folder.dir.clone() }))
 }
 
 fn check_depth_scale(depth_scale: f32) -> Result<(), RecordingError> {

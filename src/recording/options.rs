@@ -3,7 +3,7 @@
 use super::DepthUnit;
 
 /// Options for reading a recording.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Units of the depth pictures per metre, > 0; `None` for those that the layout states or usually has.
     pub depth_scale: Option<f32>,
@@ -19,6 +19,8 @@ pub struct Options {
     pub period_ns: Option<u64>,
     /// Width and height of the scenes to read, where a recording has scenes of several sizes; `None` for the first.
     pub size: Option<(u32, u32)>,
+    /// Names of the topics to read from a recording of ROS: one of colour, and one of depth. Others are chosen.
+    pub topics: Vec<String>,
     /// Whether links may lead outside the recording.
     pub follow_links: bool,
     /// Whether faulty lines of lists and missing right pictures become frames that fail to read. Otherwise the first
@@ -37,6 +39,7 @@ impl Default for Options {
             pair_tolerance_ns: 20_000_000,
             period_ns: None,
             size: None,
+            topics: Vec::new(),
             follow_links: false,
             keep_going: false,
         }

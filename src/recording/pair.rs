@@ -52,7 +52,7 @@ pub(super) fn pair_by_time(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns
 ///
 /// In merged order the closest two times of different lists are always neighbours, so only neighbours are candidates:
 /// `n log n` for any tolerance.
-fn pair_nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
+pub(super) fn pair_nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
     let colors = color_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Color(index)));
     let depths = depth_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Depth(index)));
     let mut merged: Vec<_> = colors.chain(depths).collect();

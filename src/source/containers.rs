@@ -1,4 +1,4 @@
-//! Recordings in a single file, which other programs turn into folders that can be read.
+//! Recordings in a single file, which other programs turn into what can be read.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -11,13 +11,13 @@ const KINECT_HEAD: u64 = 1 << 20;
 /// Returns whether a file is such a recording: by its extension, and a `.mkv` by Azure Kinect's tags.
 pub(super) fn is_container(path: &Path) -> bool {
     match extension(path).as_str() {
-        "bag" | "db3" | "mcap" | "svo" | "svo2" | "r3d" => true,
+        "bag" | "db3" | "svo" | "svo2" => true,
         "mkv" => is_from_kinect(path),
         _ => false,
     }
 }
 
-/// Describes in one line how the recording becomes a folder with `color` and `depth`.
+/// Describes in one line how the recording becomes a folder that can be read.
 pub(super) fn describe_conversion(path: &Path) -> String {
     let folder = path.with_extension("");
     let (file, dir) = (path.display(), folder.display());
@@ -25,23 +25,18 @@ pub(super) fn describe_conversion(path: &Path) -> String {
         "bag" => format!(
             "a ROS bag must become a folder of pictures first; RealSense's does with Open3D (pip install open3d): \
              python3 -c \"import open3d; open3d.t.io.RSBagReader.create('{file}').save_frames('{dir}')\" writes \
-             {dir}/color and {dir}/depth; others: rosbags-convert --src '{file}' --dst '{dir}-mcap' --dst-storage \
-             mcap, then as for .mcap"
+             {dir}/color and {dir}/depth; others: pip install rosbags && rosbags-convert --src '{file}' --dst '{dir}' \
+             --dst-storage mcap --dst-typestore ros2_humble; {dir} is then the source"
         ),
-        "db3" | "mcap" => format!(
-            "a ROS 2 recording must become a folder of pictures first: write its colour topic to \
-             {dir}/color/000000.png and so on, and its depth topic to {dir}/depth/000000.png (16-bit grey, \
-             millimetres), for example with the Python package rosbags; {dir} is then the source"
+        "db3" => format!(
+            "a ROS 2 recording in a database must become an MCAP file first: pip install rosbags && rosbags-convert \
+             --src '{bag}' --dst '{dir}-mcap' --dst-storage mcap; {dir}-mcap is then the source",
+            bag = path.parent().filter(|bag| !bag.as_os_str().is_empty()).unwrap_or(Path::new(".")).display()
         ),
         "svo" | "svo2" => format!(
             "a ZED recording must become a folder of pictures first: mkdir '{dir}' && ZED_SVO_Export '{file}' '{dir}' \
              4 (of the ZED SDK's samples) writes {dir}/left000000.png and {dir}/depth000000.png; {dir} is then the \
              source"
-        ),
-        "r3d" => format!(
-            "a Record3D recording must become a folder of pictures first: unzip '{file}' -d '{dir}', then write each \
-             {dir}/rgbd/N.depth (LZFSE of 32-bit metres; Python package pyliblzfse) to {dir}/depth/N.png (16-bit \
-             grey, millimetres) and move {dir}/rgbd/N.jpg to {dir}/color; {dir} is then the source"
         ),
         _ => format!(
             "a recording of Azure Kinect must become a folder of pictures first: k4a_mkv2image -i='{file}' -s=false \
@@ -76,10 +71,8 @@ mod tests {
             ("take.bag", "#ROSBAG V2.0", "RSBagReader"),
             ("TAKE.BAG", "", "rosbags-convert"),
             ("take.db3", "SQLite format 3", "rosbags"),
-            ("take.mcap", "\u{89}MCAP0", "rosbags"),
             ("take.svo", "", "ZED_SVO_Export"),
             ("take.svo2", "", "ZED_SVO_Export"),
-            ("take.r3d", "PK", "unzip"),
             ("take.mkv", "...K4A_COLOR_MODE...", "k4a_mkv2image"),
         ] {
             let path = dir.path().join(name);

@@ -72,7 +72,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(
-            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording or a video of depth",
+            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate, a recording or a video of depth",
             DepthChoice::suggest_keyword(name)
         ))),
         Err(error) => Err(error.into()),

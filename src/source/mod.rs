@@ -273,6 +273,7 @@ impl Options {
             depth_invalid: Some(depth.depth_invalid),
             period_ns: frames.fps.map(|fps| (1e9 / fps) as u64),
             size: frames.size.map(|size| (size.width, size.height)),
+            topics: frames.topic.clone(),
             follow_links: frames.follow_links,
             keep_going: *keep_going,
             ..Reading::default()

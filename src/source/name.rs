@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use super::{DepthOrigin, Frames, Source, SourceError, containers, suggestion, video};
 use crate::capture::{demo, y4m};
-use crate::recording::{pictures, still};
+use crate::recording::{is_recording_file, pictures, still};
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -21,7 +21,7 @@ pub enum Kind {
     /// A camera, or two.
     #[default]
     Camera,
-    /// A folder with a recording.
+    /// A recording in a folder or a file of its own.
     Recording,
     /// The demonstration.
     Demo,
@@ -51,7 +51,7 @@ pub enum SourceName {
     Synthetic,
     /// The demonstration: a loop of that scene with its depth, embedded in the program.
     Demo,
-    /// A folder with a recording, or a pattern of pictures such as `DIR/IMG_%04d.jpg`.
+    /// A recording: a folder, a file of its own such as `TAKE.mcap`, or a pattern such as `DIR/IMG_%04d.jpg`.
     Folder(PathBuf),
     /// A PNG or JPEG.
     Photo(PathBuf),
@@ -104,13 +104,13 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
         true => {
-            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
+            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
         false => {
-            "a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, demo or synthetic"
+            "a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
     }
 }
@@ -203,7 +203,7 @@ impl SourceName {
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
             Some(y4m::NAME) => Ok(SourceName::Stdin),
-            _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
+            _ if path.is_dir() || is_recording_file(path) => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && still::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
             _ if path.is_file() && containers::is_container(path) => {
                 SourceError::usage_error(containers::describe_conversion(path))

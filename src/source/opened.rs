@@ -162,6 +162,9 @@ fn warn_of_own_properties(recording: &Recording, frames: &Frames) {
     if let Some(fps) = frames.fps.filter(|_| recording.has_times()) {
         tracing::warn!("without effect here: --fps {fps} (a recording has its own)");
     }
+    if !frames.topic.is_empty() && !recording.has_topics() {
+        tracing::warn!("without effect here: --topic {} (the recording has no topics)", frames.topic.join(","));
+    }
     if let Some(Size { width, height }) = frames.size.filter(|_| !recording.is_chosen_by_size()) {
         tracing::warn!("without effect here: --size {width}x{height} (a recording has its own)");
     }

@@ -20,8 +20,8 @@ use crate::depth::stereo::Settings;
 use crate::look::number::{in_range_parser, parse_positive};
 #[cfg(feature = "clap")]
 use crate::names;
-use crate::recording::DepthUnit;
 use crate::recording::depth_file::{self, Fit};
+use crate::recording::{DepthUnit, is_recording_file};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 pub use single_camera::{NetworkFile, Networks, PlateFile, SingleCameraDepth};
@@ -60,6 +60,10 @@ pub struct Frames {
     /// Frames per second; for a camera, its nearest rate; for a recording, only if it has no times [default: 30]
     #[cfg_attr(feature = "clap", arg(long, value_name = "RATE", value_parser = parse_rate))]
     pub fps: Option<f64>,
+    /// Topic of a ROS recording (.mcap) with colour or depth; may be given more than once, or as a list with commas
+    /// [default: the only one of either, else colour rather than infrared, and depth aligned to it]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_delimiter = ','))]
+    pub topic: Vec<String>,
     /// Read recordings whose links lead outside their folder
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
@@ -175,7 +179,7 @@ pub enum DepthChoice {
     Stereo,
     /// None, for effects that need none.
     None,
-    /// The depth of the recording in this folder.
+    /// The depth of the recording in this folder or file.
     Folder(PathBuf),
     /// A video of relative depth, frame by frame.
     Video(PathBuf),
@@ -212,12 +216,12 @@ impl FromStr for DepthChoice {
             "defocus" => Self::Defocus,
             "" => {
                 return Err(
-                    "use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording, a video of depth, or a depth camera"
+                    "use auto, recorded, stereo, none, matte, mono, plate, a recording, a video of depth, or a depth camera"
                         .to_string(),
                 );
             }
             text if let Some(chosen) = SingleCameraDepth::parse(text) => Self::SingleCamera(chosen?),
-            folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
+            folder if Path::new(folder).is_dir() || is_recording_file(Path::new(folder)) => Self::Folder(folder.into()),
             file if Path::new(file).is_file() && is_video(Path::new(file)) => Self::Video(file.into()),
             device => Self::Device(device.to_owned()),
         })

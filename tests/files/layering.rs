@@ -23,7 +23,7 @@ const LAYERS: [&[&str]; 13] = [
 ];
 
 /// External crates, and the only places that may name them: modules of the library, or folders of a crate above it.
-const DOORS: [(&str, &[&str]); 32] = [
+const DOORS: [(&str, &[&str]); 35] = [
     ("bokehcam_link", &["lib"]),
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
@@ -36,6 +36,8 @@ const DOORS: [(&str, &[&str]); 32] = [
     ("image", &["capture/demo", "recording", "sink"]),
     ("indicatif", &["cli"]),
     ("jiff", &["files/user_folders"]),
+    ("lz4_flex", &["recording/mcap"]),
+    ("lzfse_rust", &["recording/record3d"]),
     ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
     ("plotters", &["lab"]),
@@ -59,6 +61,7 @@ const DOORS: [(&str, &[&str]); 32] = [
     ("roxmltree", &["calibration/xml", "recording/embedded"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
+    ("ruzstd", &["recording/mcap"]),
     ("saphyr_parser", &["calibration"]),
     ("sha2", &["network/known"]),
     ("skrifa", &["window/panel/fonts"]),

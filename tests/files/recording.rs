@@ -14,6 +14,7 @@ mod middlebury;
 mod pictures;
 mod real;
 mod rgbd;
+mod single_file;
 mod still;
 mod writer;
 

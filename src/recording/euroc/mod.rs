@@ -16,7 +16,7 @@ use crate::calibration;
 pub(super) const LAYOUT: Layout = Layout {
     name: "EuRoC/ASL",
     expected_files: "mav0/cam0 with data.csv or data",
-    matches_folder: |dir| CAMERAS.iter().any(|[left, _]| left.exists_in(dir)),
+    matches: |dir| CAMERAS.iter().any(|[left, _]| left.exists_in(dir)),
     open,
 };
 

@@ -20,7 +20,7 @@ use super::{Options, StereoGeometry, Unpaired};
 pub(super) const LAYOUT: Layout = Layout {
     name: "KITTI",
     expected_files: "image_2 and image_3, or image_0 and image_1",
-    matches_folder: is_kitti_folder,
+    matches: is_kitti_folder,
     open,
 };
 

@@ -15,7 +15,7 @@ use crate::optics::StereoRig;
 pub(super) const LAYOUT: Layout = Layout {
     name: "Middlebury stereo",
     expected_files: "im0.png and im1.png",
-    matches_folder: |dir| find_pair(dir).is_some() || find_half(dir).is_some(),
+    matches: |dir| find_pair(dir).is_some() || find_half(dir).is_some(),
     open,
 };
 

@@ -18,7 +18,7 @@ use pattern::Pattern;
 pub(super) const LAYOUT: Layout = Layout {
     name: "pictures",
     expected_files: "PNG or JPEG files",
-    matches_folder: |dir| has_pictures(dir, |stem| !is_map(stem)),
+    matches: |dir| has_pictures(dir, |stem| !is_map(stem)),
     open: |folder, options| from_names(folder, find_pictures(&folder.dir, |stem| !is_map(stem))?, options),
 };
 

@@ -19,7 +19,7 @@ pub(super) const LAYOUT: Layout = Layout {
     name: "RGB-D folders",
     expected_files: "color and depth, rgb and depth, images and depths, results, or frame-000000.color.png",
     // Our own folder without its lists is an unfinished recording.
-    matches_folder: |dir| (find_pair(dir).is_some() || is_film(dir)) && !has_file_list(dir),
+    matches: |dir| (find_pair(dir).is_some() || is_film(dir)) && !has_file_list(dir),
     open,
 };
 

@@ -17,13 +17,15 @@ mod writer;
 use std::path::Path;
 
 use super::contents::Layout;
-pub use writer::{RecordingSummary, Writer, WriterOptions};
+pub use super::frame_sequence::RecordingSummary;
+pub(super) use time::Seconds;
+pub use writer::{Writer, WriterOptions};
 
 /// Lists of colour pictures and depth maps.
 pub(super) const LAYOUT: Layout = Layout {
     name: "TUM RGB-D",
     expected_files: "associations.txt or rgb.txt",
-    matches_folder: open::is_tum_folder,
+    matches: open::is_tum_folder,
     open: open::open,
 };
 

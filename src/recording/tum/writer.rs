@@ -9,7 +9,8 @@ use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, listed};
 use crate::files::folder::{self, FileSet, Folder, FolderError};
 use crate::frame::{ColorImage, DepthMap};
 use crate::recording::error::RecordingError;
-use crate::recording::{MAX_SIDE_PX, check_depth_scale, depth_covers, encode};
+use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
+use crate::recording::{check_depth_scale, encode};
 
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
@@ -47,29 +48,10 @@ pub struct Writer {
     depth: Option<GrowingList>,
     /// Declared after the lists, so that it is dropped after them.
     folder: Folder,
-    count: usize,
-    last_ns: Option<u64>,
-    size: Option<(u32, u32)>,
-    /// Number of known depth values, and of those beyond the range of the file.
-    depth_counts: (u64, u64),
+    frames: FrameSequence,
     /// Working memory for encoding: samples of a depth map, and the picture file.
     units: Vec<u8>,
     file: Vec<u8>,
-}
-
-/// The result of a recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RecordingSummary {
-    /// The folder of the recording.
-    pub dir: PathBuf,
-    /// The number of frames.
-    pub frames: usize,
-    /// Number of files removed of an earlier recording.
-    pub replaced: u64,
-    /// Number of known depth values in all frames.
-    pub known_depths: u64,
-    /// Number of depth values beyond the range of the file, written as unknown.
-    pub out_of_range_depths: u64,
 }
 
 impl Writer {
@@ -97,10 +79,7 @@ impl Writer {
             color,
             depth: None,
             folder,
-            count: 0,
-            last_ns: None,
-            size: None,
-            depth_counts: (0, 0),
+            frames: FrameSequence::default(),
             units: Vec::new(),
             file: Vec::new(),
         })
@@ -112,23 +91,17 @@ impl Writer {
     /// The frame does not fit the recording: its time is not after the last one, the size of the colour picture differs
     /// from the first, or the depth map does not cover it. Or a file cannot be written. The recording is unchanged.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
-        self.check_frame(time_ns, color, depth)
-            .map_err(|reason| RecordingError::Unrecordable { index: self.count, reason })?;
+        self.frames.check(time_ns, color, depth)?;
 
-        let file_name = format!("{:06}.png", self.count);
-        let mut depth_counts = self.depth_counts;
+        let file_name = format!("{:06}.png", self.frames.count());
         if let Some(depth) = depth {
             self.file.clear();
             encode::encode_depth_png(depth, self.depth_scale, None, &mut self.units, &mut self.file)
-                .map_err(|e| self.encoding_error(e))?;
+                .map_err(|e| self.frames.refuse(e))?;
             self.write_picture(DEPTH_FOLDER, &file_name)?;
-            let known = || depth.metres.iter().filter(|&&metres| DepthMap::is_known(metres));
-            let max_depth_m = self.max_depth_m();
-            depth_counts.0 += known().count() as u64;
-            depth_counts.1 += known().filter(|&&metres| metres > max_depth_m).count() as u64;
         }
         self.file.clear();
-        encode::encode_color_png(color, &mut self.file).map_err(|e| self.encoding_error(e))?;
+        encode::encode_color_png(color, &mut self.file).map_err(|e| self.frames.refuse(e))?;
         self.write_picture(COLOR_FOLDER, &file_name)?;
 
         // Lists after pictures, so that listed files exist; a frame that fails is in neither list.
@@ -148,14 +121,13 @@ impl Writer {
             }
             return Err(error);
         }
-        (self.count, self.last_ns, self.size, self.depth_counts) =
-            (self.count + 1, Some(time_ns), Some(color.size()), depth_counts);
+        self.frames.add(time_ns, color, depth, self.max_depth_m());
         Ok(())
     }
 
     /// Returns the number of frames so far.
     pub fn frames(&self) -> usize {
-        self.count
+        self.frames.count()
     }
 
     /// Returns the largest depth that can be written, in metres.
@@ -168,7 +140,7 @@ impl Writer {
     /// # Errors
     /// No frame was added (an empty recording cannot be read), or a list cannot be written.
     pub fn finish(self) -> Result<RecordingSummary, RecordingError> {
-        let mut written = self.summary();
+        let mut written = self.frames.summary(&self.dir);
         let folder = self.finish_lists()?;
         written.replaced = folder.finish()?;
         Ok(written)
@@ -180,21 +152,16 @@ impl Writer {
     /// # Errors
     /// Same as for [`Writer::finish`].
     pub fn finish_incomplete(self) -> Result<RecordingSummary, RecordingError> {
-        let mut written = self.summary();
+        let mut written = self.frames.summary(&self.dir);
         let folder = self.finish_lists()?;
         written.dir = folder.finish_incomplete()?.unwrap_or(written.dir);
         Ok(written)
     }
 
-    fn summary(&self) -> RecordingSummary {
-        let (known_depths, out_of_range_depths) = self.depth_counts;
-        RecordingSummary { dir: self.dir.clone(), frames: self.count, replaced: 0, known_depths, out_of_range_depths }
-    }
-
     /// Finishes the lists and returns the folder.
     fn finish_lists(self) -> Result<Folder, RecordingError> {
         let mut folder = self.folder;
-        if self.count == 0 {
+        if self.frames.count() == 0 {
             return Err(RecordingError::NothingRecorded { dir: self.dir });
         }
         // The colour list comes last, because it makes the folder a recording.
@@ -203,42 +170,6 @@ impl Writer {
         }
         self.color.commit(&mut folder)?;
         Ok(folder)
-    }
-
-    /// Checks that the frame can be the next one of the recording; returns the reason if not.
-    fn check_frame(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
-        let (width, height) = color.size();
-        if let Some(last_ns) = self.last_ns.filter(|&last_ns| time_ns <= last_ns) {
-            return Err(format!("its time {} s is not after the last one, {} s", Seconds(time_ns), Seconds(last_ns)));
-        }
-        if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
-            return Err(format!("it is {width}x{height}, and pictures have 1 to {MAX_SIDE_PX} pixels a side"));
-        }
-        if let Some((first_width, first_height)) = self.size.filter(|&size| size != color.size()) {
-            return Err(format!("it is {width}x{height}, and the first frame was {first_width}x{first_height}"));
-        }
-        if color.rgb.len() != width as usize * height as usize * 3 {
-            return Err(format!("it is {width}x{height}, and has {} bytes", color.rgb.len()));
-        }
-        if let Some(depth) = depth {
-            let (depth_width, depth_height) = depth.size();
-            if !depth_covers(depth.size(), color.size()) {
-                return Err(format!(
-                    "its depth is {depth_width}x{depth_height}, which does not cover {width}x{height}"
-                ));
-            }
-            if depth.metres.len() != depth_width as usize * depth_height as usize {
-                return Err(format!(
-                    "its depth is {depth_width}x{depth_height}, and has {} values",
-                    depth.metres.len()
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    fn encoding_error(&self, error: impl std::fmt::Display) -> RecordingError {
-        RecordingError::Unrecordable { index: self.count, reason: error.to_string() }
     }
 
     fn write_picture(&mut self, folder: &str, file_name: &str) -> Result<(), RecordingError> {

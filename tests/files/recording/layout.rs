@@ -137,12 +137,12 @@ fn depth_follows_the_scale_and_the_value_for_unknown() {
     let options = Options { depth_scale: Some(1000.0), ..Options::default() };
     let read = |options: &Options| depth_of(&scene.open_with(options).unwrap(), 0).unwrap().metres;
     assert!(read(&options).iter().all(|&metres| metres == 5.0));
-    assert!(read(&Options { depth_invalid: Some(5000), ..options }).iter().all(|&metres| metres == 0.0));
+    assert!(read(&Options { depth_invalid: Some(5000), ..options.clone() }).iter().all(|&metres| metres == 0.0));
     scene.depth("depth/0.png", SIZE, 0);
     assert!(read(&options).iter().all(|&metres| metres == 0.0));
     for depth_scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert_says(
-            scene.open_with(&Options { depth_scale: Some(depth_scale), ..options }),
+            scene.open_with(&Options { depth_scale: Some(depth_scale), ..options.clone() }),
             &["depth scale", "units per metre"],
         );
     }

@@ -14,28 +14,31 @@ use crate::terminal;
 use bokehcam::capture::{Captured, FrameBuffers, FrameData};
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::tum::{RecordingSummary, Writer, WriterOptions};
+use bokehcam::recording::RecordingWriter;
+use bokehcam::recording::tum::RecordingSummary;
 use bokehcam::source::{Options, Source, SourceName};
 
-/// Record a source in the TUM RGB-D layout
+/// Record a source in the TUM RGB-D layout, or as an MCAP file of ROS 2
 ///
 /// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; for two cameras, by stereo matching) and their
 /// lists. The lists appear when the recording is complete; Ctrl-C completes a recording of a camera. With --force, a
 /// complete recording replaces the files listed by an earlier one in the folder, and no others; an incomplete one is
-/// kept beside it as DIR.incomplete.
+/// kept beside it as DIR.incomplete. A name ending in .mcap is a file instead: colour as CompressedImage (PNG), depth
+/// as compressedDepth (millimetres), each with an uncalibrated CameraInfo.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam record /dev/video0 --size 640x480 --frames 300 --to recordings/me
   bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
-  bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
+  bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt
+  bokehcam record somewhere/take.r3d --to take.mcap")]
 pub struct RecordCommand {
-    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, a video, - (y4m on standard input), `demo` or
-    /// `synthetic`
+    /// A camera, two cameras LEFT,RIGHT, a recording (a folder, .mcap or .r3d), a video, - (y4m on standard input),
+    /// `demo` or `synthetic`
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
-    /// Folder for the recording
-    #[arg(long, alias = "out", value_name = "DIR")]
+    /// Folder for the recording, or an MCAP file
+    #[arg(long, alias = "out", value_name = "DIR|FILE.mcap")]
     to: PathBuf,
     #[command(flatten)]
     frames: options::Frames,
@@ -62,7 +65,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
     if ["mp4", "mkv", "webm", "mov", "avi", "y4m"].contains(&ending) && !command.to.is_dir() {
         let to = command.to.display();
         return Err(CliError::Usage(format!(
-            "--to {to}: a recording is a folder of pictures; a video is made by `bokehcam stream {} --effect none --to FILE.mp4`",
+            "--to {to}: a recording is a folder of pictures or a .mcap file; a video is made by `bokehcam stream {} --effect none --to FILE.mp4`",
             command.source
         )));
     }
@@ -87,8 +90,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
         );
     }
     let info = camera.info();
-    let options = WriterOptions { overwrite: command.output.force, ..WriterOptions::default() };
-    let mut writer = Writer::create(&command.to, &options)?;
+    let mut writer = RecordingWriter::create(&command.to, command.output.force)?;
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
@@ -140,6 +142,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
             if !global.quiet {
                 let gone = match written.replaced {
                     0 => String::new(),
+                    1 => ", in place of an earlier one".to_owned(),
                     files => format!(", in place of {files} files of an earlier recording"),
                 };
                 let (dir, frames) = (written.dir.display(), written.frames);
@@ -160,13 +163,14 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
 }
 
 /// Keeps the frames of an interrupted recording, and reports where.
-fn keep_partial(writer: Writer, to: &Path) -> Result<(), CliError> {
+fn keep_partial(writer: RecordingWriter, to: &Path) -> Result<(), CliError> {
     let written = writer.finish_incomplete()?;
-    let frames = written.frames;
+    let (frames, old, kept) = (written.frames, to.display(), written.dir.display());
     if written.dir == to {
-        tracing::warn!("{}: incomplete; the {frames} frames until then can be read", to.display());
+        tracing::warn!("{old}: incomplete; the {frames} frames until then can be read");
+    } else if !to.exists() {
+        tracing::warn!("{old}: incomplete; the {frames} frames until then are in {kept}");
     } else {
-        let (old, kept) = (to.display(), written.dir.display());
         tracing::warn!("{old}: unchanged; the new recording is incomplete, and its {frames} frames are in {kept}");
     }
     Ok(())

@@ -72,6 +72,11 @@ const NEEDS_OF_SOURCE: &[Requirement] = &[
         FrameOrigin::Source(Kind::Photo) => Some("a photo has its own size and only one frame"),
         _ => None,
     }),
+    (&["topic"], |run| match run.source {
+        // The recording itself says whether it has topics.
+        FrameOrigin::Source(Kind::Recording) => None,
+        _ => Some("the source is not a ROS recording"),
+    }),
     (&["format", "control"], |run| {
         (run.source != FrameOrigin::Source(Kind::Camera)).then_some("the source is not a camera")
     }),

@@ -113,4 +113,4 @@ macro_rules! targets {
     };
 }
 
-targets! { calibration command_line depth_calibration depth_map embedded_depth mjpeg picture raw_pixels recording settings snapshot }
+targets! { calibration command_line depth_calibration depth_map embedded_depth mjpeg picture raw_pixels recording recording_file settings snapshot }

@@ -1,0 +1,187 @@
+//! Recordings of ROS in an MCAP file (mcap.dev/spec), as rosbag2 writes them: pictures and depth maps on topics, paired
+//! by the times at which they were taken.
+
+mod chunk;
+mod definitions;
+mod fields;
+mod file;
+mod file_writer;
+mod message;
+mod pixels;
+mod rvl;
+mod scan;
+mod topic;
+mod writer;
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
+use super::decode::DepthUnits;
+use super::error::RecordingError;
+use super::{DepthUnit, Options, Unpaired, pair, timeline};
+use crate::files::input;
+use chunk::ChunkCache;
+use file::McapFile;
+use topic::{Message, Topic};
+pub use writer::Writer;
+
+/// A file, or a folder of rosbag2 with one.
+pub(super) const LAYOUT: Layout =
+    Layout { name: "MCAP", expected_files: "a file .mcap of ROS", matches: |path| !find_files(path).is_empty(), open };
+
+/// What rosbag2 writes beside its files.
+const METADATA: &str = "metadata.yaml";
+
+/// Units of depth pictures per metre (ROS REP 118).
+const DEPTH_SCALE: f32 = 1000.0;
+
+/// Returns the files of a recording: itself, or those in a folder of rosbag2.
+fn find_files(path: &Path) -> Vec<PathBuf> {
+    let is_mcap = |path: &Path| {
+        let is_named = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+        path.is_file() && (is_named || starts_with_magic(path))
+    };
+    if path.is_file() {
+        return Some(path.to_owned()).filter(|path| is_mcap(path)).into_iter().collect();
+    }
+    if !path.join(METADATA).is_file() {
+        return Vec::new();
+    }
+    let inside = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = inside.filter(|path| is_mcap(path)).collect();
+    files.sort();
+    files
+}
+
+fn starts_with_magic(path: &Path) -> bool {
+    let mut start = [0; scan::MAGIC.len()];
+    input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == scan::MAGIC
+}
+
+/// Opens the file, chooses its topics, and pairs their pictures.
+fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
+    let fault = |what: String| RecordingError::File { path: folder.dir.clone(), what };
+    let path = match &find_files(&folder.dir)[..] {
+        [path] => path.clone(),
+        [first, ..] => return Err(fault(format!("several files; give one of them, such as {}", first.display()))),
+        [] => folder.dir.clone(),
+    };
+    let name = path.display().to_string();
+    if !starts_with_magic(&path) {
+        return Err(fault("not an MCAP file, although its name says so; copy it again".to_owned()));
+    }
+    let file = input::open(&path).map_err(RecordingError::io("open the recording", &path))?;
+    let found = scan::scan(&file, &name).map_err(RecordingError::io("read the recording", &path))?;
+    let ending = || found.damage.as_ref().map_or(String::new(), |damage| format!("; {damage}"));
+    let choice = topic::choose(&found.topics, &options.topics, &found.others)
+        .map_err(|what| fault(format!("{what}{}", ending())))?;
+    let [color, depth] = [Some(choice.color), choice.depth].map(|at| at.map(|at| &found.topics[at]));
+    let Some(color) = color else { return Err(fault("it has no pictures".to_owned())) };
+    if let Some(damage) = &found.damage {
+        tracing::warn!("{name}: damaged: {damage}; what is whole is played");
+    }
+    if choice.is_guess {
+        let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
+        tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
+    }
+    if let Some(depth) = depth.filter(|depth| depth.frame_id != color.frame_id) {
+        let (of_depth, of_color) = (depth.frame_id.escape_debug(), color.frame_id.escape_debug());
+        tracing::warn!(
+            "{name}: the depth of {depth} is of another camera ({of_depth}) than the colour ({of_color}), and is taken \
+             as if both had the same view; record a topic of aligned depth"
+        );
+    }
+    if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
+        tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
+    }
+
+    let (colors, frames, unpaired) = pair_frames(color, depth);
+    if frames.is_empty() {
+        let depth = depth.map_or(String::new(), |depth| depth.to_string());
+        return Err(fault(format!(
+            "no depth map of {depth} was taken within half a frame of a picture of {color}; name other topics with \
+             --topic, or use --depth none"
+        )));
+    }
+    let listed = frames.iter().map(|&(at, depth_at)| ListedFrame {
+        time_ns: Some(colors[at].0),
+        color: color.source(colors[at].1),
+        right: None,
+        depth: depth.zip(depth_at).map(|(depth, at)| depth.source(at)),
+    });
+    let listed = listed.collect();
+    let given = options.depth_unit.units_per_m().or(options.depth_scale);
+    let units = DepthUnits {
+        scale: given.unwrap_or(DEPTH_SCALE),
+        invalid: options.depth_invalid.filter(|&invalid| invalid != 0),
+    };
+    let depth_format = depth.map(|depth| match given {
+        Some(_) if !depth.has_metres() => DepthFormat::Units(units),
+        _ => DepthFormat::StatedUnits(units),
+    });
+    let frames = frames.into_iter().map(|(at, depth_at)| (colors[at].1, depth_at)).collect();
+    let container = McapFile {
+        file,
+        topics: found.topics,
+        chunks: found.chunks,
+        chosen: [Some(choice.color), choice.depth],
+        frames,
+        units,
+        cache: ChunkCache::default(),
+    };
+    Ok(Contents {
+        frames: listed,
+        depth: depth_format,
+        unpaired,
+        has_times: true,
+        container: Some(Box::new(container)),
+        ..Contents::default()
+    })
+}
+
+/// Pictures of a topic in order: their times, and their positions in the topic.
+type Timed = Vec<(u64, usize)>;
+
+/// Returns the pictures of a topic in the order of their times, each time once.
+fn in_order(topic: &Topic, has_stamps: bool) -> Timed {
+    let time_ns = |message: &Message| if has_stamps { message.stamp_ns } else { message.log_ns };
+    let mut timed: Timed = topic.messages.iter().map(time_ns).zip(0..).collect();
+    timed.sort_unstable();
+    timed.dedup_by_key(|(time_ns, _)| *time_ns);
+    timed
+}
+
+/// Pairs the pictures with the depth maps that were taken within half a frame. Returns the pictures in order, the frames
+/// (the position of a picture there, and that of the depth map in its topic), and the counts of what is left over.
+fn pair_frames(color: &Topic, depth: Option<&Topic>) -> (Timed, Vec<(usize, Option<usize>)>, Unpaired) {
+    // Some drivers leave the times at 0.
+    let has_stamps =
+        [Some(color), depth].into_iter().flatten().flat_map(|topic| &topic.messages).all(|m| m.stamp_ns > 0);
+    let colors = in_order(color, has_stamps);
+    let Some(depth) = depth else {
+        let frames = (0..colors.len()).map(|at| (at, None)).collect();
+        return (colors, frames, Unpaired::default());
+    };
+    let depths = in_order(depth, has_stamps);
+    let times = |timed: &Timed| timed.iter().map(|&(time_ns, _)| time_ns).collect::<Vec<_>>();
+    let tolerance_ns = timeline::median_period_ns(times(&colors).into_iter()) / 2;
+    let partners = pair::pair_nearest(&times(&colors), &times(&depths), tolerance_ns);
+    let frames: Vec<_> =
+        partners.into_iter().enumerate().filter_map(|(at, depth)| Some((at, Some(depths[depth?].1)))).collect();
+    let unpaired = Unpaired {
+        color: color.messages.len() - frames.len(),
+        depth: depth.messages.len() - frames.len(),
+        ..Unpaired::default()
+    };
+    (colors, frames, unpaired)
+}
+
+impl Topic {
+    /// Names a message, for messages to users.
+    fn source(&self, at: usize) -> PictureSource {
+        let name = self.to_string();
+        PictureSource::from_path(format!("{}, message {at}", name.trim_start_matches('/')).into())
+    }
+}

@@ -1,0 +1,326 @@
+//! Finds the messages with pictures in a file, in one pass over its records.
+//!
+//! The pass needs no summary at the end of the file, so that a file that was cut short is read up to its last whole
+//! record. It skips what is in the messages: of a file without compression it reads some hundred bytes per picture.
+//! Compressed chunks are decompressed, because only a message itself has the time at which its picture was taken.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek};
+use std::time::{Duration, Instant};
+
+use super::chunk::Chunk;
+use super::fields::Fields;
+use super::message::{Encoding, Kind, MAX_MESSAGE_BYTES, Preview};
+use super::topic::{Message, Topic};
+use crate::recording::list::MAX_ENTRIES;
+
+/// The first and the last bytes of a file.
+pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+
+/// Operation codes of records.
+pub(super) const SCHEMA: u8 = 3;
+pub(super) const CHANNEL: u8 = 4;
+pub(super) const MESSAGE: u8 = 5;
+pub(super) const CHUNK: u8 = 6;
+pub(super) const DATA_END: u8 = 15;
+
+/// Bytes of a record before its content: operation code and length.
+const HEAD_BYTES: u64 = 9;
+/// Bytes of a message's record before the message.
+const MESSAGE_HEAD_BYTES: u64 = 22;
+/// Bytes of a chunk's record up to the name of its compression.
+const CHUNK_HEAD_BYTES: u64 = 32;
+
+/// Longest name of a compression.
+const MAX_COMPRESSION_BYTES: usize = 16;
+
+/// Largest schema or channel that is read; others have no pictures.
+const MAX_DEFINITION_BYTES: u64 = 1 << 20;
+/// Longest name of a topic that is read.
+const MAX_NAME_BYTES: usize = 1024;
+/// Number of characters that are kept of a type's name.
+const MAX_TYPE_CHARS: usize = 80;
+/// Number of topics without pictures that a message lists.
+const MAX_OTHERS: usize = 12;
+
+/// Buffer of the pass, small because most of a file is skipped.
+const BUFFER_BYTES: usize = 1 << 13;
+
+/// A pass that takes longer is reported.
+const SLOW: Duration = Duration::from_secs(2);
+
+/// What a file contains.
+#[derive(Debug, Default)]
+pub(super) struct Contents {
+    /// Topics of messages with pictures.
+    pub topics: Vec<Topic>,
+    /// Compressed chunks.
+    pub chunks: Vec<Chunk>,
+    /// Some topics without pictures, with their types.
+    pub others: Vec<String>,
+    /// What is wrong with the file, if anything.
+    pub damage: Option<String>,
+}
+
+/// The end of a part of the file.
+type End = Result<(), Damage>;
+
+/// The fault of a file that was cut short, or of a wrong length in it.
+const CUT: &str = "it ends within a record";
+
+enum Damage {
+    /// A fault of the file.
+    Fault(String),
+    Io(io::Error),
+}
+
+impl From<io::Error> for Damage {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            ErrorKind::UnexpectedEof => Self::Fault(CUT.to_owned()),
+            _ => Self::Io(error),
+        }
+    }
+}
+
+/// Scans a file, which must begin with [`MAGIC`]. `name` is for messages.
+///
+/// # Errors
+/// The system cannot read the file. Faults of the file are part of the result.
+pub(super) fn scan(file: &File, name: &str) -> io::Result<Contents> {
+    let bytes = file.metadata()?.len();
+    let mut scanner = Scanner {
+        found: Contents::default(),
+        file,
+        name,
+        schemas: HashMap::new(),
+        channels: HashMap::new(),
+        message_count: 0,
+        began: Instant::now(),
+        has_warned: false,
+    };
+    let mut reader = BufReader::with_capacity(BUFFER_BYTES, file);
+    reader.seek(io::SeekFrom::Start(MAGIC.len() as u64))?;
+    let mut position = MAGIC.len() as u64;
+    match scanner.scan_records(&mut reader, &mut position, bytes, None) {
+        Ok(()) => {}
+        Err(Damage::Fault(what)) => scanner.note_damage(format!("{what} (at byte {position})")),
+        Err(Damage::Io(error)) => return Err(error),
+    }
+    Ok(scanner.found)
+}
+
+struct Scanner<'a> {
+    found: Contents,
+    file: &'a File,
+    name: &'a str,
+    /// Types of messages.
+    schemas: HashMap<u16, String>,
+    /// Positions of topics with pictures, by channel.
+    channels: HashMap<u16, usize>,
+    message_count: usize,
+    began: Instant,
+    has_warned: bool,
+}
+
+impl Scanner<'_> {
+    fn note_damage(&mut self, what: String) {
+        self.found.damage.get_or_insert(what);
+    }
+
+    /// Scans records up to `end`; `chunk` is the number of the compressed chunk that they are in.
+    fn scan_records(&mut self, reader: &mut (impl Read + Seek), at: &mut u64, end: u64, chunk: Option<u32>) -> End {
+        // End of the chunk without compression that these records are in.
+        let mut chunk_end = None;
+        while *at < end {
+            if end - *at < HEAD_BYTES {
+                return Err(Damage::Fault(CUT.to_owned()));
+            }
+            chunk_end = chunk_end.filter(|&chunk_end| *at < chunk_end);
+            let mut head = [0; HEAD_BYTES as usize];
+            reader.read_exact(&mut head)?;
+            let (content_at, length) = (*at + HEAD_BYTES, Fields::packed(&head[1..]).u64().unwrap_or_default());
+            let next = content_at.saturating_add(length);
+            let is_chunk = head[0] == CHUNK && chunk.is_none() && chunk_end.is_none();
+            // No record has the code 0: a file that was not written to its end may go on with zeros.
+            if head[0] == 0 || next > chunk_end.unwrap_or(end).min(end) && !is_chunk {
+                let what = if head[0] == 0 { "something that is no record" } else { CUT };
+                let Some(chunk_end) = chunk_end.take().filter(|&chunk_end| chunk_end <= end) else {
+                    return Err(Damage::Fault(what.to_owned()));
+                };
+                // What follows the chunk can be read.
+                self.note_damage(format!("{what} at byte {at}"));
+                reader.seek_relative((chunk_end - content_at) as i64)?;
+                *at = chunk_end;
+                continue;
+            }
+            let mut read = content_at;
+            match head[0] {
+                // The rest of the file repeats what came before.
+                DATA_END if chunk.is_none() => return Ok(()),
+                CHUNK if is_chunk => {
+                    // Without compression, its records follow as if there were no chunk.
+                    if let Some(records_at) = self.scan_chunk(reader, content_at, next, end)? {
+                        (*at, chunk_end) = (records_at, Some(next));
+                        continue;
+                    }
+                    read = next;
+                }
+                SCHEMA | CHANNEL if length <= MAX_DEFINITION_BYTES => {
+                    let mut content = vec![0; length as usize];
+                    reader.read_exact(&mut content)?;
+                    let defined = match head[0] {
+                        SCHEMA => self.define_schema(&content),
+                        _ => self.define_channel(&content),
+                    };
+                    if defined.is_none() {
+                        self.note_damage(format!("a schema or channel at byte {at} is damaged"));
+                    }
+                    read = next;
+                }
+                MESSAGE => read += self.scan_message(reader, content_at, length, chunk)?,
+                _ => {}
+            }
+            reader.seek_relative((next - read) as i64)?;
+            *at = next;
+        }
+        match chunk {
+            Some(_) => Ok(()),
+            None => Err(Damage::Fault("the end of the file is missing".to_owned())),
+        }
+    }
+
+    fn define_schema(&mut self, content: &[u8]) -> Option<()> {
+        let mut fields = Fields::packed(content);
+        let (id, name) = (fields.u16()?, fields.text()?);
+        self.schemas.insert(id, name.chars().take(MAX_TYPE_CHARS).collect());
+        Some(())
+    }
+
+    fn define_channel(&mut self, content: &[u8]) -> Option<()> {
+        let mut fields = Fields::packed(content);
+        let (id, schema, name, encoding) = (fields.u16()?, fields.u16()?, fields.text()?, fields.text()?);
+        if self.channels.contains_key(&id) || name.len() > MAX_NAME_BYTES {
+            return Some(());
+        }
+        let kind = self.schemas.get(&schema).map_or("no type", String::as_str);
+        if let (Some(kind), Some(encoding)) = (Kind::from_type(kind), Encoding::from_name(encoding)) {
+            let topics = &mut self.found.topics;
+            let is_same = |topic: &Topic| (&*topic.name, topic.kind, topic.encoding) == (name, kind, encoding);
+            let topic = topics.iter().position(is_same).unwrap_or_else(|| {
+                topics.push(Topic::new(name, kind, encoding));
+                topics.len() - 1
+            });
+            self.channels.insert(id, topic);
+        } else {
+            let text = format!("{name} ({kind}, {encoding})").escape_debug().to_string();
+            let others = &mut self.found.others;
+            if others.len() < MAX_OTHERS && !others.contains(&text) {
+                others.push(text);
+            }
+        }
+        Some(())
+    }
+
+    /// Notes a message with a picture; returns the number of bytes read.
+    fn scan_message(
+        &mut self,
+        reader: &mut impl Read,
+        at: u64,
+        length: u64,
+        chunk: Option<u32>,
+    ) -> Result<u64, Damage> {
+        let mut bytes = [0; MESSAGE_HEAD_BYTES as usize + Preview::BYTES];
+        let mut read = length.min(MESSAGE_HEAD_BYTES) as usize;
+        reader.read_exact(&mut bytes[..read])?;
+        let mut fields = Fields::packed(&bytes[..read]);
+        let (Some(channel), Some(_), Some(log_ns)) = (fields.u16(), fields.u32(), fields.u64()) else {
+            self.note_damage(format!("a message at byte {at} is too short"));
+            return Ok(read as u64);
+        };
+        let Some(&topic) = self.channels.get(&channel).filter(|_| length >= MESSAGE_HEAD_BYTES) else {
+            return Ok(read as u64);
+        };
+        let length = length - MESSAGE_HEAD_BYTES;
+        let previewed = length.min(Preview::BYTES as u64) as usize;
+        reader.read_exact(&mut bytes[read..read + previewed])?;
+        read += previewed;
+        let topic = &mut self.found.topics[topic];
+        match Preview::parse(&bytes[MESSAGE_HEAD_BYTES as usize..read], topic.kind, topic.encoding) {
+            Some(preview) if length <= MAX_MESSAGE_BYTES => {
+                self.message_count += 1;
+                if self.message_count > MAX_ENTRIES {
+                    return Err(Damage::Fault(format!("more than {MAX_ENTRIES} pictures; split the file")));
+                }
+                let message = Message {
+                    stamp_ns: preview.stamp_ns,
+                    log_ns,
+                    at: at + MESSAGE_HEAD_BYTES,
+                    length: length as u32,
+                    chunk,
+                };
+                topic.add(message, &preview);
+            }
+            _ => {
+                let what = format!("a message of {topic} at byte {at} is damaged");
+                self.note_damage(what);
+            }
+        }
+        Ok(read as u64)
+    }
+
+    /// Scans a chunk whose record has its content from `at` to `next`. Returns the position of its records in the file
+    /// if they are not compressed.
+    fn scan_chunk(
+        &mut self,
+        reader: &mut (impl Read + Seek),
+        at: u64,
+        next: u64,
+        end: u64,
+    ) -> Result<Option<u64>, Damage> {
+        if !self.has_warned && self.began.elapsed() > SLOW {
+            self.has_warned = true;
+            tracing::warn!("{}: looking through the file; this takes long", self.name);
+        }
+        let mut head = [0; CHUNK_HEAD_BYTES as usize];
+        reader.read_exact(&mut head)?;
+        let mut fields = Fields::packed(&head[16..]);
+        let (bytes, crc) = (fields.u64().unwrap_or_default(), fields.u32().unwrap_or_default());
+        let name_bytes = fields.u32().unwrap_or_default() as usize;
+        let mut name = vec![0; name_bytes.min(MAX_COMPRESSION_BYTES) + 8];
+        reader.read_exact(&mut name)?;
+        let coded_bytes = Fields::packed(&name.split_off(name.len() - 8)).u64().unwrap_or_default();
+        let coded_at = at + CHUNK_HEAD_BYTES + name.len() as u64 + 8;
+        let is_whole = name_bytes <= MAX_COMPRESSION_BYTES && coded_at.checked_add(coded_bytes) == Some(next);
+        if is_whole && name.is_empty() {
+            return Ok(Some(coded_at));
+        }
+        if next > end {
+            return Err(Damage::Fault(CUT.to_owned()));
+        }
+        if !is_whole {
+            self.note_damage(format!("the chunk at byte {at} is left out: its lengths contradict each other"));
+            reader.seek(io::SeekFrom::Start(next))?;
+            return Ok(None);
+        }
+        let name = String::from_utf8_lossy(&name).into_owned();
+        let number = self.found.chunks.len() as u32;
+        match Chunk::new(&name, coded_at, coded_bytes, bytes, crc).and_then(|chunk| Ok((chunk.read(self.file)?, chunk)))
+        {
+            Ok((records, chunk)) => {
+                self.found.chunks.push(chunk);
+                let mut inside_at = 0;
+                let scanned =
+                    self.scan_records(&mut Cursor::new(&records), &mut inside_at, records.len() as u64, Some(number));
+                if let Err(Damage::Fault(what)) = scanned {
+                    self.note_damage(format!("{what} in the chunk at byte {at}"));
+                }
+            }
+            // The chunks after it can be read.
+            Err(fault) => self.note_damage(format!("the chunk at byte {at} is left out: {fault}")),
+        }
+        reader.seek(io::SeekFrom::Start(next))?;
+        Ok(None)
+    }
+}
