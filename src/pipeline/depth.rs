@@ -181,12 +181,13 @@ impl<'a> Stage<'a> {
         stamp: Stamp,
     ) -> Result<Made, Fault> {
         let Shared { clock, pools, output_request, info, .. } = self.shared;
-        if let Some(field) = self.preprocessor.fixed_coc() {
-            return Ok((None, field));
-        }
         let began_ns = clock.now_ns();
+        // Also without depth: the picture's geometry and size do not change with the look.
         if let Some(source) = &mut self.source {
             source.rectify(color);
+        }
+        if let Some(field) = self.preprocessor.fixed_coc() {
+            return Ok((None, field));
         }
         if output_request.as_ref().is_some_and(|output_request| output_request.requires_own_depth()) {
             self.scheduler.iter_mut().for_each(DepthScheduler::discard_held_depth);

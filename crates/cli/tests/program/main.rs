@@ -30,6 +30,7 @@ mod heic;
 #[cfg(feature = "networks")]
 mod networks;
 mod outputs;
+mod orientation;
 mod packaging;
 mod plate;
 mod presets;

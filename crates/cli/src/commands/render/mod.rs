@@ -95,6 +95,8 @@ pub struct RenderCommand {
     #[arg(long, value_name = "DIR")]
     debug_dir: Option<PathBuf>,
     #[command(flatten)]
+    orientation: options::Orientation,
+    #[command(flatten)]
     blur: options::Blur,
     #[command(flatten)]
     depth: options::Depth,
@@ -208,6 +210,7 @@ impl RenderCommand {
         source::Options {
             // Only depth cameras have a calibration file.
             depth: options::Depth { depth_calibration: None, ..self.depth.clone() },
+            frames: options::Frames { orientation: self.orientation, ..options::Frames::default() },
             networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
             computing: self.computing.to_compute_options(),
