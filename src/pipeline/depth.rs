@@ -157,9 +157,10 @@ impl<'a> Stage<'a> {
         coc: CocField,
     ) -> Frame<Prepared> {
         let Shared { clock, pools, is_viewed, .. } = self.shared;
-        let kept = is_viewed.then_some(&pools.original);
-        let composed =
-            depth.as_mut().map(|map| self.preprocessor.compose(&mut color, map, &coc, frame.stamp.time_ns, kept));
+        let (originals, time_ns) = (is_viewed.then_some(&pools.original), frame.stamp.time_ns);
+        let composed = depth
+            .as_mut()
+            .map(|map| self.preprocessor.compose(&mut color, map, &coc, time_ns, originals, || pools.kept.take()));
         let (began_ns, at_ns) = (mem::replace(&mut frame.since_ns, clock.now_ns()), frame.since_ns);
         frame.trace.depth_ns = at_ns - began_ns;
         let times = depth.is_some().then(|| DepthTimes {
