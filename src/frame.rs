@@ -6,6 +6,7 @@ pub mod crop;
 pub mod fit;
 mod matte;
 pub mod scale;
+pub mod transform;
 
 pub use matte::{Mask, Matte, MixedPixel};
 

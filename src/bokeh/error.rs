@@ -54,6 +54,12 @@ pub enum BokehError {
         /// Lengths of the pixels, the result and the radii.
         lengths: [usize; 3],
     },
+    /// Only colours are returned here, and the result has alpha, too.
+    #[error(
+        "--behind transparent: only `render` to PNG and `stream` to DIR/ (PNG), FILE.webm and FILE.mov write an alpha \
+         channel; use a colour"
+    )]
+    Transparent,
     /// The executor accepted a picture and returned no result.
     #[error("the blur returned no picture: please report this")]
     Lost,

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "camera")]
 use super::pixels::NoColor;
+use crate::frame::transform::Area;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 use crate::pipewire::PipeWireError;
 use crate::recording::RecordingError;
@@ -73,6 +74,18 @@ pub enum CaptureError {
         left: (u32, u32),
         /// Width and height of the right pictures.
         right: (u32, u32),
+    },
+    /// The part to keep is not within the pictures.
+    #[error(
+        "--crop {}: the pictures of {source_name} are {}x{} after --rotate; choose a part of them",
+        area.map(|area| area.to_string()).unwrap_or_default(), size_px.0, size_px.1
+    )]
+    AreaOutside {
+        source_name: String,
+        /// The part to keep.
+        area: Option<Area>,
+        /// Width and height of the pictures once they are rotated.
+        size_px: (u32, u32),
     },
     /// The camera cannot be opened.
     #[cfg(feature = "camera")]

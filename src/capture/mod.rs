@@ -11,6 +11,7 @@ mod seek;
 pub mod side_by_side;
 pub mod stereo_pair;
 pub mod synthetic;
+pub mod transformed;
 #[cfg(feature = "camera")]
 pub mod v4l2;
 pub mod video;

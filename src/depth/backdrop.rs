@@ -4,10 +4,16 @@
 //! background is in focus. In a mixed pixel, only the farther surface's part is replaced. Surfaces in front of the
 //! subject blur over the virtual background as they would over the room.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+mod background;
+mod cut_out;
+mod light;
 
-use crate::color::{encode_srgb, srgb_to_linear_table};
+#[cfg(feature = "files")]
+pub use background::BackgroundVideo;
+pub use background::{Background, BackgroundPicture};
+pub use cut_out::CutOut;
+use light::LightTables;
+
 use crate::frame::scale::RowScaler;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
@@ -19,46 +25,11 @@ const BACKGROUND_RAMP: [f32; 2] = [0.8, 0.667];
 /// Surfaces in front of the focal plane with a smaller CoC, in pixels, do not blur over the background.
 const SHARP_PX: f32 = 0.5;
 
-/// What to show behind the subject.
-#[derive(Clone, Debug, Default)]
-pub enum Background {
-    /// The room, blurred.
-    #[default]
-    Blur,
-    /// A colour, as sRGB codes.
-    Color([u8; 3]),
-    /// A picture, scaled to cover the frame and cropped equally on both sides.
-    Picture(Arc<BackgroundPicture>),
-}
-
-/// A picture for a virtual background.
-#[derive(Debug)]
-pub struct BackgroundPicture {
-    /// The file it was loaded from, if any.
-    pub file: Option<PathBuf>,
-    /// Its pixels.
-    pub image: ColorImage,
-}
-
-impl PartialEq for Background {
-    fn eq(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Blur, Self::Blur) => true,
-            (Self::Color(a), Self::Color(b)) => a == b,
-            // Compares identity, not content: this comparison runs often.
-            (Self::Picture(a), Self::Picture(b)) => Arc::ptr_eq(a, b),
-            _ => false,
-        }
-    }
-}
-
 /// Replaces the background of frame after frame; owns the memory for it.
 #[derive(Debug)]
 pub struct VirtualBackground {
     background: Background,
-    linear: Box<[f32; 256]>,
-    /// Lookup table to sRGB: [`TABLE_LEN`] entries, uniform in the square root of linear light.
-    srgb_table: Box<[u8; TABLE_LEN]>,
+    light: LightTables,
     /// The virtual background, scaled to the frame.
     scaled: ColorImage,
     scale: RowScaler,
@@ -74,8 +45,6 @@ struct CompositedPixel {
     metres: f32,
 }
 
-/// Entries of the table to sRGB: the darkest codes are four entries apart.
-const TABLE_LEN: usize = 4096;
 /// Pixels processed together: mostly all or none of them are replaced.
 const CHUNK: usize = 32;
 
@@ -85,11 +54,9 @@ impl VirtualBackground {
         if *background == Background::Blur {
             return None;
         }
-        let linear_of = |step: usize| (step as f32 / (TABLE_LEN - 1) as f32).powi(2);
         Some(Self {
             background: background.clone(),
-            linear: srgb_to_linear_table(),
-            srgb_table: Box::new(std::array::from_fn(|step| encode_srgb(linear_of(step)))),
+            light: LightTables::default(),
             scaled: ColorImage::default(),
             scale: RowScaler::default(),
             row: Vec::new(),
@@ -141,8 +108,8 @@ impl VirtualBackground {
         for (((pixel, background), metres), &fraction) in pixels.zip(metres).zip(fractions) {
             *metres = pull_to_focus(*metres, fraction, lens);
             for (code, &background) in pixel.iter_mut().zip(background) {
-                let [own, linear] = [*code, background].map(|code| self.linear[usize::from(code)]);
-                *code = if fraction == 1.0 { background } else { self.encode_linear(own + fraction * (linear - own)) };
+                let [own, linear] = [*code, background].map(|code| self.light.decode(code));
+                *code = if fraction == 1.0 { background } else { self.light.encode(own + fraction * (linear - own)) };
             }
         }
     }
@@ -157,15 +124,12 @@ impl VirtualBackground {
         }
         let mut rgb = [0; 3];
         for (p, code) in rgb.iter_mut().enumerate() {
-            let (linear, background) = (
-                self.linear[usize::from(color.rgb[3 * at + p])],
-                self.linear[usize::from(self.scaled.rgb[3 * at + p])],
-            );
+            let [linear, background] = [color, &self.scaled].map(|image| self.light.decode(image.rgb[3 * at + p]));
             let surfaces =
                 [linear + (1.0 - pixel.alpha) * pixel.difference[p], linear - pixel.alpha * pixel.difference[p]];
             let [near, far] = [0, 1].map(|k| surfaces[k] + fractions[k] * (background - surfaces[k]));
             pixel.difference[p] = near - far;
-            *code = self.encode_linear(far + pixel.alpha * (near - far));
+            *code = self.light.encode(far + pixel.alpha * (near - far));
         }
         pixel.background_alpha = 1.0;
         let surfaces = [(pixel.near_m, fractions[0]), (pixel.far_m, fractions[1])];
@@ -191,12 +155,30 @@ impl VirtualBackground {
             Background::Picture(picture) => {
                 scale_to_cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row));
             }
+            #[cfg(feature = "files")]
+            Background::Video(video) => {
+                scale_to_cover(&video.first, &mut self.scaled, (&mut self.scale, &mut self.row));
+            }
+            // Premultiplied: where nothing is, there is no light.
+            Background::Transparent => self.scaled.rgb.fill(0),
         }
     }
 
-    fn encode_linear(&self, linear: f32) -> u8 {
-        let linear = linear.clamp(0.0, 1.0);
-        self.srgb_table[(linear.sqrt() * (TABLE_LEN - 1) as f32 + 0.5) as usize]
+    /// Shows another picture behind frames of `size` from now on: the middle of `picture`, which has the
+    /// [size to cover](cover_size) them.
+    #[cfg(feature = "files")]
+    pub fn show_covering(&mut self, picture: &ColorImage, size: (u32, u32)) {
+        self.scale_to_frame(size);
+        let [width, height, whole_width, whole_height] =
+            [size.0, size.1, picture.width, picture.height].map(|side| side as usize);
+        if whole_width < width || whole_height < height || self.scaled.rgb.is_empty() {
+            return;
+        }
+        let (left, top) = ((whole_width - width) / 2, (whole_height - height) / 2);
+        let rows = picture.rgb.chunks_exact(3 * whole_width).skip(top);
+        for (into, row) in self.scaled.rgb.chunks_exact_mut(3 * width).zip(rows) {
+            into.copy_from_slice(&row[3 * left..3 * (left + width)]);
+        }
     }
 }
 
@@ -219,13 +201,19 @@ fn pull_to_focus(metres: f32, fraction: f32, lens: &DepthCoc) -> f32 {
     (inverse + fraction * (lens.focus_m.recip() - inverse)).recip()
 }
 
+/// Returns the size of a picture of `from` once it is scaled, in its proportions, to just cover one of `into`.
+pub fn cover_size(from: (u32, u32), into: (u32, u32)) -> (u32, u32) {
+    let ratio = (f64::from(into.0) / f64::from(from.0)).max(f64::from(into.1) / f64::from(from.1));
+    let scaled = |side: u32, least: u32| ((f64::from(side) * ratio).round() as u32).max(least);
+    (scaled(from.0, into.0), scaled(from.1, into.1))
+}
+
 /// Scales a picture so that it covers `into`, and crops the rest equally on both sides.
 fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut RowScaler, &mut Vec<u16>)) {
     let [from_width, from_height, width, height] =
         [from.width, from.height, into.width, into.height].map(|side| side as usize);
-    let ratio = (width as f64 / from_width as f64).max(height as f64 / from_height as f64);
-    let whole = [from_width, from_height].map(|side| (side as f64 * ratio).round() as usize);
-    let whole = (whole[0].max(width), whole[1].max(height));
+    let whole = cover_size(from.size(), into.size());
+    let whole = (whole.0 as usize, whole.1 as usize);
     scale.set_sizes((from_width, from_height), whole);
     let (left, top) = ((whole.0 - width) / 2, (whole.1 - height) / 2);
     for (y, line) in into.rgb.chunks_exact_mut(3 * width).enumerate() {
@@ -235,7 +223,10 @@ fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut 
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::color::{encode_srgb, srgb_to_linear_table};
 
     const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
     const GREEN: Background = Background::Color([0, 177, 64]);

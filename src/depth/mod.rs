@@ -31,6 +31,7 @@ pub mod registration;
 pub mod single_camera;
 pub mod stereo;
 mod tap;
+pub mod transformed;
 #[cfg(feature = "files")]
 pub mod video;
 

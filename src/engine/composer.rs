@@ -1,5 +1,7 @@
 //! Composes the subject: virtual background and auto-framing.
 
+#[cfg(feature = "files")]
+use super::backdrop_player::BackdropPlayer;
 use crate::depth::backdrop::{Background, VirtualBackground};
 use crate::depth::follow::AutoFraming;
 use crate::frame::crop::Crop;
@@ -28,16 +30,48 @@ impl OriginalFrame {
     }
 }
 
-/// Replaces the background of frames and crops them around the subject.
+/// What is kept of a frame, over nothing: a picture and its map, to be blurred like the frame
+/// ([`VirtualBackground::draw_kept`]).
 #[derive(Default)]
+pub(crate) struct Kept {
+    pub color: ColorImage,
+    pub map: DepthMap,
+}
+
+/// How a video behind the subject is played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Playback {
+    /// Its first picture stays.
+    Still,
+    /// At the times of the frames, which wait for it.
+    EveryPicture,
+    /// At the times of the frames, which do not wait.
+    Realtime,
+}
+
+/// Replaces the background of frames and crops them around the subject.
 pub(super) struct Composer {
     backdrop: Option<VirtualBackground>,
     follower: Option<AutoFraming>,
+    playback: Playback,
+    #[cfg(feature = "files")]
+    player: Option<BackdropPlayer>,
+    /// The video's picture, as large as it is decoded.
+    #[cfg(feature = "files")]
+    picture: ColorImage,
 }
 
 impl Composer {
-    pub fn new(look: &Look) -> Self {
-        let mut composer = Self::default();
+    pub fn new(look: &Look, playback: Playback) -> Self {
+        let mut composer = Self {
+            backdrop: None,
+            follower: None,
+            playback,
+            #[cfg(feature = "files")]
+            player: None,
+            #[cfg(feature = "files")]
+            picture: ColorImage::default(),
+        };
         composer.set_look(look);
         composer
     }
@@ -50,6 +84,41 @@ impl Composer {
         match (&mut self.follower, look.follow.zoom()) {
             (Some(follower), Some(zoom)) => follower.set_max_zoom(zoom),
             (follower, zoom) => *follower = zoom.map(AutoFraming::new),
+        }
+    }
+
+    /// Returns whether results have an alpha channel.
+    pub fn is_transparent(&self) -> bool {
+        self.backdrop.as_ref().is_some_and(|backdrop| *backdrop.background() == Background::Transparent)
+    }
+
+    /// Draws what is kept of a frame of `size`, before it is composed.
+    pub fn draw_kept(&mut self, size: (u32, u32), map: &DepthMap, field: &CocField, kept: &mut Kept) {
+        if let (CocField::Depth(lens), Some(backdrop)) = (field, &mut self.backdrop) {
+            backdrop.draw_kept((size, map), lens, &mut kept.color, &mut kept.map);
+        }
+    }
+
+    /// Shows the picture of a video that is due at `time_ns`, behind frames of `size`.
+    #[cfg(feature = "files")]
+    fn play_video(&mut self, size: (u32, u32), time_ns: u64) {
+        let Self { backdrop: Some(backdrop), playback, player, picture, .. } = self else { return };
+        let Background::Video(video) = backdrop.background() else { return };
+        if *playback == Playback::Still {
+            return;
+        }
+        if !player.as_ref().is_some_and(|player| player.plays(video)) {
+            let waits = *playback == Playback::EveryPicture;
+            match BackdropPlayer::start(video.clone(), size, waits) {
+                Ok(new) => *player = Some(new),
+                Err(error) => {
+                    tracing::warn!("--behind video: {error}; its first picture stays");
+                    *playback = Playback::Still;
+                }
+            }
+        }
+        if player.as_mut().is_some_and(|player| player.take_picture(time_ns, picture)) {
+            backdrop.show_covering(picture, size);
         }
     }
 
@@ -68,6 +137,8 @@ impl Composer {
         time_ns: u64,
     ) -> Option<Crop> {
         let CocField::Depth(lens) = field else { return None };
+        #[cfg(feature = "files")]
+        self.play_video(color.size(), time_ns);
         let crop = self.follower.as_mut().map(|follower| follower.update_crop(map, lens, time_ns));
         if let Some(backdrop) = &mut self.backdrop {
             backdrop.replace_background(color, map, lens);

@@ -1,10 +1,11 @@
 //! Blurs frame by frame on the caller's thread: what a run does to each frame, for programs with their own threads.
 
-use super::{Blur, Engine, Images, Input, Origin};
+use super::{Blur, Engine, Images, Input, Origin, Playback};
 use crate::bokeh::BokehError;
 use crate::budget::Quality;
 use crate::clock::Clock;
 use crate::computing::{ComputeOptions, ExecutorFactory};
+use crate::depth::backdrop::Background;
 use crate::frame::crop::Cropper;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
@@ -39,7 +40,9 @@ impl FrameProcessor {
         computing: ComputeOptions,
     ) -> Result<Self, BokehError> {
         let depth = if measured { Origin::Measured } else { Origin::Synthesized };
-        let input = Input { size, frames: None, depth, knows_background: false, threads: computing.thread_count() };
+        reject_transparency(look)?;
+        let (playback, threads) = (Playback::EveryPicture, computing.thread_count());
+        let input = Input { size, frames: None, depth, knows_background: false, playback, threads };
         let mut executors = ExecutorFactory::new(computing);
         // Until a budget is set, time is unlimited.
         let mut blur = Blur::default();
@@ -66,6 +69,7 @@ impl FrameProcessor {
     /// # Errors
     /// Same as for [`FrameProcessor::new`]; the current look stays in use.
     pub fn set_look(&mut self, look: &Look) -> Result<(), BokehError> {
+        reject_transparency(look)?;
         let Self { engine: Engine { preprocessor, blur }, executors, size, .. } = self;
         blur.set_look(look, (*size, self.adaptive), |settings| executors.create_blur(settings, *size))?;
         preprocessor.set_look(look);
@@ -112,7 +116,7 @@ impl FrameProcessor {
     pub fn process(&mut self, time_ns: u64) -> Result<&ColorImage, BokehError> {
         let Self { engine: Engine { preprocessor, blur }, images, .. } = self;
         let Some(quality) = blur.quality() else { return Ok(&images.color) };
-        let (coc, crop) = preprocessor.preprocess(&mut images.color, images.depth.as_mut(), time_ns)?;
+        let (coc, composed) = preprocessor.preprocess(&mut images.color, images.depth.as_mut(), time_ns)?;
         let began_ns = self.clock.now_ns();
         blur.blur(images, coc)?;
         if self.is_timed {
@@ -120,7 +124,7 @@ impl FrameProcessor {
             blur.picker.record_blur(quality, now_ns - began_ns, now_ns);
         }
         blur.has_changed_backend();
-        Ok(match crop {
+        Ok(match composed.crop {
             None => &images.blurred,
             Some(crop) => {
                 self.cropper.crop(&images.blurred, &crop, &mut self.cropped);
@@ -133,4 +137,9 @@ impl FrameProcessor {
     pub fn take_warning(&mut self) -> Option<String> {
         self.engine.preprocessor.take_warning()
     }
+}
+
+/// Refuses a look whose results have an alpha channel: frames are returned as colours only.
+pub(super) fn reject_transparency(look: &Look) -> Result<(), BokehError> {
+    if look.background == Background::Transparent { Err(BokehError::Transparent) } else { Ok(()) }
 }

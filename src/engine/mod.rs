@@ -8,6 +8,8 @@
 // Some items are only used by the threads of a run.
 #![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports))]
 
+#[cfg(feature = "files")]
+mod backdrop_player;
 mod blur;
 mod coc;
 mod composer;
@@ -20,7 +22,7 @@ pub mod still;
 pub(crate) use blur::TimeBudget;
 pub use blur::{Blur, Images};
 pub use coc::{CocCalculator, Postprocess};
-pub(crate) use composer::OriginalFrame;
+pub(crate) use composer::{Kept, OriginalFrame, Playback};
 pub use frame_processor::FrameProcessor;
 pub(crate) use preprocessor::{Composed, Input, Origin, Preprocessor};
 

@@ -2,7 +2,7 @@
 //! and auto-framing.
 
 use super::coc::{CocCalculator, Postprocess};
-use super::composer::{Composer, OriginalFrame};
+use super::composer::{Composer, Kept, OriginalFrame, Playback};
 use super::fit_check::{FitCheck, Verdict};
 use crate::bokeh::{Bokeh, BokehError};
 use crate::compute::DeviceFrame;
@@ -51,6 +51,8 @@ pub(crate) struct Input {
     pub depth: Origin,
     /// Whether the depth source provides the background behind the nearer surface, so that none is remembered.
     pub knows_background: bool,
+    /// How a video behind the subject is played.
+    pub playback: Playback,
     /// Number of worker threads, the caller's included; the results are bit-identical.
     pub threads: usize,
 }
@@ -62,6 +64,8 @@ pub(crate) struct Composed {
     pub crop: Option<Crop>,
     /// The frame before its background was replaced, if it was and the original is kept.
     pub original: Option<Pooled<OriginalFrame>>,
+    /// What is kept of the frame, if its result has an alpha channel.
+    pub kept: Option<Pooled<Kept>>,
     /// The device's copy of picture and depth, if the device has refined the depth.
     pub on_device: Option<Pooled<DeviceFrame>>,
 }
@@ -95,7 +99,7 @@ impl Preprocessor {
             postprocess,
             coc: CocCalculator::new(look.coc_rule(input.size), postprocess).with_threads(input.threads),
             exactness: create_exactness_detector(look, postprocess),
-            composer: Composer::new(look),
+            composer: Composer::new(look, input.playback),
             check: checks.then(|| FitCheck::new(input.frames)),
             warning: None,
         };
@@ -201,27 +205,34 @@ impl Preprocessor {
     }
 
     /// Replaces the background behind the subject of a picture whose depth is finished ([`Composer::compose`]). If that
-    /// changes the frame and `kept` is given, the original is kept in one of its buffers.
+    /// changes the frame and `originals` is given, the original is kept in one of its buffers. `kept_parts` has buffers for
+    /// results with an alpha channel.
     pub fn compose(
         &mut self,
         color: &mut ColorImage,
         map: &mut DepthMap,
         field: &CocField,
         time_ns: u64,
-        kept: Option<&Pool<OriginalFrame>>,
+        originals: Option<&Pool<OriginalFrame>>,
+        kept_parts: impl FnOnce() -> Pooled<Kept>,
     ) -> Composed {
         let replaces = self.composer.replaces_background(field);
-        let original = kept.filter(|_| replaces).map(|pool| {
+        let original = originals.filter(|_| replaces).map(|pool| {
             let mut original = pool.take();
             original.copy_from(color, map);
             original
         });
         // The device's copy is of the original picture: useless once the background is replaced.
         let on_device = self.coc.take_device_copy().filter(|_| !replaces);
-        Composed { crop: self.composer.compose(color, map, field, time_ns), original, on_device }
+        let kept = (replaces && self.composer.is_transparent()).then(|| {
+            let mut kept = kept_parts();
+            self.composer.draw_kept(color.size(), map, field, &mut kept);
+            kept
+        });
+        Composed { crop: self.composer.compose(color, map, field, time_ns), original, kept, on_device }
     }
 
-    /// Runs all steps for the frame at `time_ns`; returns its CoC and the crop to show, `None` for all.
+    /// Runs all steps for the frame at `time_ns`; returns its CoC and how it was composed.
     ///
     /// # Errors
     /// [`BokehError::NoDepth`] if the CoC follows depth and there is no map.
@@ -230,13 +241,14 @@ impl Preprocessor {
         color: &mut ColorImage,
         map: Option<&mut DepthMap>,
         time_ns: u64,
-    ) -> Result<(CocField, Option<Crop>), BokehError> {
+    ) -> Result<(CocField, Composed), BokehError> {
         if let Some(field) = self.fixed_coc() {
-            return Ok((field, None));
+            return Ok((field, Composed::default()));
         }
         let map = map.ok_or(BokehError::NoDepth)?;
         let field = self.compute_coc(map, color, time_ns);
-        Ok((field, self.compose(color, map, &field, time_ns, None).crop))
+        let composed = self.compose(color, map, &field, time_ns, None, || Pooled::detached(Kept::default()));
+        Ok((field, composed))
     }
 }
 
@@ -262,7 +274,7 @@ mod tests {
     fn prepared(refine: Refine, (color, map): (&ColorImage, &DepthMap)) -> (DepthMap, Option<&'static str>) {
         let look = Look { refine, background_memory: BackgroundMemory::Off, ..Look::default() };
         let (size, depth) = (color.size(), Origin::Measured);
-        let input = Input { size, frames: None, depth, knows_background: false, threads: 1 };
+        let input = Input { size, frames: None, depth, knows_background: false, playback: Playback::Still, threads: 1 };
         let mut preprocessor = Preprocessor::new(&look, input);
         let mut last = map.clone();
         for frame in 0..6 {

@@ -1,9 +1,12 @@
 //! Blurs a single picture, in the same way as a stream.
 
-use super::{Blur, Images, Input, Origin, Preprocessor};
+use super::frame_processor::reject_transparency;
+use super::{Blur, Images, Input, Kept, Origin, Playback, Preprocessor};
 use crate::bokeh::BokehError;
 use crate::computing::ComputeOptions;
+use crate::depth::backdrop::CutOut;
 use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
 use crate::look::Look;
 use crate::optics::CocField;
 
@@ -15,47 +18,95 @@ pub enum Depth {
     Final(DepthMap),
 }
 
+/// A blurred picture.
+pub struct Rendered {
+    /// Its colours; straight, not premultiplied, if it has alpha.
+    pub color: ColorImage,
+    /// Alpha of each pixel, 0 to 255, row by row, if the background of the look is transparent.
+    pub alpha: Option<Vec<u8>>,
+    /// Describes the executor.
+    pub by: String,
+}
+
 /// Computes the circle of confusion of every pixel of `color`; returns it with the depth map, if it follows depth. A
 /// measured map is returned with its holes filled; it is refined if the look asks for it, or leaves it open and the map
 /// does not fit the picture. A virtual background is put into the picture.
 ///
 /// # Errors
-/// [`BokehError::NoDepth`] if the blur follows depth and none is given.
+/// [`BokehError::NoDepth`] if the blur follows depth and none is given; the look's background is transparent.
 pub fn compute_coc_and_depth(
     look: &Look,
     color: &mut ColorImage,
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
+    reject_transparency(look)?;
+    prepare(look, color, depth).map(|(field, map, _)| (field, map))
+}
+
+/// Does the same for any background, and returns what is kept of the picture if that is transparent.
+fn prepare(
+    look: &Look,
+    color: &mut ColorImage,
+    depth: Option<Depth>,
+) -> Result<(CocField, Option<DepthMap>, Option<Pooled<Kept>>), BokehError> {
     let (depth, mut map) = match depth {
         Some(Depth::Measured(map)) => (Origin::Single, Some(map)),
         Some(Depth::Final(map)) => (Origin::Finished, Some(map)),
         None => (Origin::Finished, None),
     };
-    let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, threads: 1 };
+    let playback = Playback::Still;
+    let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, playback, threads: 1 };
     // A single picture is never cropped.
-    let (field, _) = Preprocessor::new(look, input).preprocess(color, map.as_mut(), 0)?;
-    Ok((field, map.filter(|_| matches!(field, CocField::Depth(_)))))
+    let (field, composed) = Preprocessor::new(look, input).preprocess(color, map.as_mut(), 0)?;
+    Ok((field, map.filter(|_| matches!(field, CocField::Depth(_))), composed.kept))
 }
 
 /// Blurs the picture `color` as `look` says; returns it with a description of the executor. Effect `none` leaves it
 /// unchanged.
 ///
 /// # Errors
-/// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist.
+/// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist; the
+/// look's background is transparent ([`render_picture`]).
 pub fn blur_picture(
+    look: &Look,
+    color: ColorImage,
+    depth: Option<Depth>,
+    computing: &ComputeOptions,
+) -> Result<(ColorImage, String), BokehError> {
+    reject_transparency(look)?;
+    render_picture(look, color, depth, computing).map(|rendered| (rendered.color, rendered.by))
+}
+
+/// Does the same as [`blur_picture`], for transparent backgrounds, too.
+///
+/// # Errors
+/// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist.
+pub fn render_picture(
     look: &Look,
     mut color: ColorImage,
     depth: Option<Depth>,
     computing: &ComputeOptions,
-) -> Result<(ColorImage, String), BokehError> {
+) -> Result<Rendered, BokehError> {
     let size = color.size();
     if look.coc_kind().is_none() {
-        return Ok((color, "not blurred".to_string()));
+        return Ok(Rendered { color, alpha: None, by: "not blurred".to_string() });
     }
-    let (coc, depth) = compute_coc_and_depth(look, &mut color, depth)?;
+    let (coc, depth, kept) = prepare(look, &mut color, depth)?;
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
     blur.set_look(look, (size, false), |settings| computing.create_blur(settings, size))?;
     blur.blur(&mut images, coc)?;
+    let mut color = images.blurred;
+    let alpha = match kept {
+        None => None,
+        Some(mut kept) => {
+            let Kept { color: kept, map } = std::mem::take(&mut *kept);
+            let mut images = Images { color: kept, depth: Some(map), ..Images::default() };
+            blur.blur(&mut images, coc)?;
+            let mut cut_out = CutOut::default();
+            cut_out.unpremultiply(&mut color, &images.blurred);
+            Some(cut_out.alpha)
+        }
+    };
     let [_, by] = blur.describe_executor();
-    Ok((images.blurred, by))
+    Ok(Rendered { color, alpha, by })
 }

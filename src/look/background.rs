@@ -1,31 +1,35 @@
-//! Parses and prints the setting of the background behind the subject; its picture, if any, is not read yet.
+//! Parses and prints the setting of the background behind the subject; its picture or video, if any, is not read yet.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
-use crate::depth::backdrop::{Background, BackgroundPicture};
-use crate::recording::RecordingError;
+use super::LookError;
+use crate::depth::backdrop::{Background, BackgroundPicture, BackgroundVideo};
 use crate::recording::still::read_color;
 
 /// The background behind the subject as a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BackgroundSetting {
-    /// Blur, a colour, or a picture that was read.
+    /// Blur, a colour, nothing, or a picture or video that was read.
     Loaded(Background),
     /// `image:FILE`, not read yet.
     Image(PathBuf),
+    /// `video:FILE`, not opened yet.
+    Video(PathBuf),
 }
 
 impl FromStr for BackgroundSetting {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        const FORMS: &str = "use blur, color:#RRGGBB or image:FILE";
+        const FORMS: &str = "use blur, color:#RRGGBB, image:FILE, video:FILE or transparent";
         match text.split_once(':') {
             None if text == "blur" => Some(Self::Loaded(Background::Blur)),
+            None if text == "transparent" => Some(Self::Loaded(Background::Transparent)),
             Some(("color", color)) => parse_rgb(color).map(|rgb| Self::Loaded(Background::Color(rgb))),
             Some(("image", file)) if !file.is_empty() => Some(Self::Image(file.into())),
+            Some(("video", file)) if !file.is_empty() => Some(Self::Video(file.into())),
             None if let Some((_, rgb)) = COLORS.iter().find(|(name, _)| *name == text) => {
                 Some(Self::Loaded(Background::Color(*rgb)))
             }
@@ -66,6 +70,9 @@ impl fmt::Display for BackgroundSetting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Image(file) => write!(f, "image:{}", file.display()),
+            Self::Video(file) => write!(f, "video:{}", file.display()),
+            Self::Loaded(Background::Video(video)) => write!(f, "video:{}", video.file.path.display()),
+            Self::Loaded(Background::Transparent) => f.write_str("transparent"),
             Self::Loaded(Background::Blur) => f.write_str("blur"),
             Self::Loaded(Background::Color([red, green, blue])) => write!(f, "color:#{red:02x}{green:02x}{blue:02x}"),
             Self::Loaded(Background::Picture(picture)) => match &picture.file {
@@ -85,16 +92,32 @@ impl BackgroundSetting {
         }
     }
 
-    /// Returns the background, and reads its picture if needed.
+    /// Returns the file that it names, if there is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Image(file) | Self::Video(file) => Some(file),
+            Self::Loaded(Background::Picture(picture)) => picture.file.as_deref(),
+            Self::Loaded(Background::Video(video)) => Some(&video.file.path),
+            Self::Loaded(_) => None,
+        }
+    }
+
+    /// Returns whether results have an alpha channel.
+    pub fn is_transparent(&self) -> bool {
+        *self == Self::Loaded(Background::Transparent)
+    }
+
+    /// Returns the background, and reads its picture, or the first one of its video, if needed.
     ///
     /// # Errors
-    /// The picture of `image:FILE` cannot be read.
-    pub fn load(&self) -> Result<Background, RecordingError> {
+    /// The picture of `image:FILE` or `video:FILE` cannot be read.
+    pub fn load(&self) -> Result<Background, LookError> {
         Ok(match self {
             Self::Loaded(behind) => behind.clone(),
             Self::Image(file) => {
                 Background::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image: read_color(file)? }))
             }
+            Self::Video(file) => Background::Video(Arc::new(BackgroundVideo::open(file)?)),
         })
     }
 }
@@ -106,7 +129,7 @@ mod tests {
 
     #[test]
     fn what_is_behind_reads_back_what_it_prints() {
-        for text in ["blur", "color:#00b140", "color:#ffffff", "image:a:b.png"] {
+        for text in ["blur", "color:#00b140", "color:#ffffff", "image:a:b.png", "video:a:b.mp4", "transparent"] {
             assert_eq!(text.parse::<BackgroundSetting>().unwrap().to_string(), text);
         }
         assert_eq!("color:00B140".parse::<BackgroundSetting>(), "color:#00b140".parse());
@@ -135,6 +158,8 @@ mod tests {
             "color:+12345",
             "color:#gg0000",
             "image:",
+            "video:",
+            "transparent:1",
         ] {
             assert!(text.parse::<BackgroundSetting>().unwrap_err().contains("color:#RRGGBB"), "{text}");
         }

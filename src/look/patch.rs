@@ -11,6 +11,7 @@ use crate::bokeh::aperture::Shape;
 use crate::depth::backdrop::Background;
 use crate::optics::Lens;
 use crate::recording::RecordingError;
+use crate::video::VideoError;
 
 /// An error in the settings of a look.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +22,9 @@ pub enum LookError {
     /// A picture cannot be read.
     #[error(transparent)]
     Picture(#[from] RecordingError),
+    /// A video behind the subject cannot be read.
+    #[error("--behind: {0}")]
+    Video(#[from] VideoError),
 }
 
 impl Patch {
@@ -82,14 +86,14 @@ impl Patch {
         self
     }
 
-    /// Returns the files of pictures that are not read yet.
+    /// Returns the files of pictures and videos that are not read yet.
     pub fn unread_files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let aperture = match &mut self.aperture {
             Some(ApertureSetting::Image(file)) => Some(file),
             _ => None,
         };
         let behind = match &mut self.behind {
-            Some(BackgroundSetting::Image(file)) => Some(file),
+            Some(BackgroundSetting::Image(file) | BackgroundSetting::Video(file)) => Some(file),
             _ => None,
         };
         aperture.into_iter().chain(behind)
@@ -107,8 +111,8 @@ impl Patch {
     /// Reads the pictures it names, so that [`Patch::apply_to`] need not.
     ///
     /// # Errors
-    /// A picture cannot be read.
-    pub fn load_pictures(&mut self) -> Result<(), RecordingError> {
+    /// A picture or video cannot be read.
+    pub fn load_pictures(&mut self) -> Result<(), LookError> {
         if let Some(name) = &mut self.aperture {
             *name = ApertureSetting::Loaded(name.load()?);
         }
@@ -142,6 +146,7 @@ impl Patch {
             (None, _) => {}
             (Some(BackgroundSetting::Image(file)), Background::Picture(picture))
                 if picture.file.as_ref() == Some(file) => {}
+            (Some(BackgroundSetting::Video(file)), Background::Video(video)) if video.file.path == *file => {}
             (Some(name), _) => look.background = name.load()?,
         }
         if let Some(intensity) = self.intensity {

@@ -125,7 +125,8 @@ settings! {
     refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of list_choices::<Refine>();
     /// Background that shows through blurred outlines in a stream
     background_memory: BackgroundMemory = "background-memory" "WHETHER" Blur BackgroundMemory::from_str, one of list_choices::<BackgroundMemory>();
-    /// What is behind the subject: blur (the room), color:#RRGGBB or image:FILE
+    /// What is behind the subject: blur (the room), color:#RRGGBB, image:FILE, video:FILE (played in a loop) or
+    /// transparent (an alpha channel in PNG, WebM and MOV)
     behind: BackgroundSetting = "behind" "WHAT" Blur BackgroundSetting::from_str;
     /// Keep the subject in the middle by showing a part of the picture: the largest zoom, up to 4, or off
     follow: FramingZoom = "follow" "ZOOM" Blur FramingZoom::from_str;

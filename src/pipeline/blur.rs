@@ -1,6 +1,7 @@
 //! Third stage: drops frames that are too late and blurs the rest; swaps the executor when a frame brings another.
 
 use std::collections::VecDeque;
+use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -10,8 +11,9 @@ use super::frame::Frame;
 use super::output_request::OutputRequest;
 use super::{Fault, MAX_IN_FLIGHT, Shared, StageResult};
 use crate::bokeh::{BlurredFrame, Job, PassTimes, Picture};
+use crate::budget::Quality;
 use crate::compute::PictureLocation;
-use crate::engine::{Blur, Composed, OriginalFrame};
+use crate::engine::{Blur, Composed, Kept, OriginalFrame};
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -28,6 +30,8 @@ pub(super) struct Blurred {
     pub coc: CocField,
     /// The crop that goes out; `None` is the whole picture.
     pub crop: Option<Crop>,
+    /// What is kept of the picture, blurred like it, if its background is transparent.
+    pub kept: Option<Pooled<ColorImage>>,
 }
 
 pub(super) struct Stage<'a> {
@@ -49,6 +53,8 @@ struct InFlight {
     coc: CocField,
     crop: Option<Crop>,
     original: Option<Pooled<OriginalFrame>>,
+    /// What is kept of it, blurred, and how long that took.
+    kept: Option<(Pooled<ColorImage>, u64)>,
 }
 
 type From = Receiver<Frame<Prepared>>;
@@ -92,6 +98,10 @@ impl<'a> Stage<'a> {
                     }
                     continue;
                 }
+                // A transparent background takes a blur of its own, which no other frame may overlap.
+                if frame.item.composed.kept.is_some() && !self.collect_all(&mut to)? {
+                    return Ok(());
+                }
                 if !self.submit(frame)? {
                     continue;
                 }
@@ -113,15 +123,44 @@ impl<'a> Stage<'a> {
     fn swap_executor(&mut self, prepared: &mut Prepared, to: &mut To) -> Result<bool, Fault> {
         let Some(swap) = prepared.swap.take().filter(|swap| swap.number != self.last_swap) else { return Ok(true) };
         self.last_swap = swap.number;
-        while !self.in_flight.is_empty() {
-            if !self.collect(true, to)? {
-                return Ok(false);
-            }
+        if !self.collect_all(to)? {
+            return Ok(false);
         }
         if let Some((executor, rule)) = swap.take() {
             self.blur.replace_executor(executor, rule);
         }
         Ok(true)
+    }
+
+    /// Forwards all frames that the executor has in flight; returns whether the output is still open.
+    fn collect_all(&mut self, to: &mut To) -> Result<bool, Fault> {
+        while !self.in_flight.is_empty() {
+            if !self.collect(true, to)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Blurs what is kept of a frame, while no frame is in flight; returns it with the time it took, in nanoseconds.
+    fn blur_kept(
+        &mut self,
+        mut kept: Pooled<Kept>,
+        coc: CocField,
+        (ticket, quality): (u64, Quality),
+    ) -> Result<(Pooled<ColorImage>, u64), Fault> {
+        let Shared { clock, pools, .. } = self.shared;
+        let began_ns = clock.now_ns();
+        let Kept { color, map } = mem::take(&mut *kept);
+        let mut out = pools.kept_outs.take();
+        out.resize(color.width, color.height);
+        let job = Job::new(Pooled::detached(color), Some(Pooled::detached(map)), coc);
+        self.blur.submit(Job { ticket, quality, out, ..job })?;
+        let BlurredFrame { picture, mut color, depth, .. } = self.blur.collect(true)?.ok_or(Fault::LostFrame)?;
+        // Their memory serves a later frame.
+        *kept =
+            Kept { color: mem::take(&mut *color), map: depth.map(|mut map| mem::take(&mut *map)).unwrap_or_default() };
+        Ok((picture.into_memory().ok_or(Fault::LostFrame)?, clock.now_ns() - began_ns))
     }
 
     /// Forwards a frame unblurred, unless it is late; returns whether the output is still open.
@@ -133,7 +172,9 @@ impl<'a> Stage<'a> {
             return true;
         }
         let (picture, depth) = (Picture::from_memory(color), depth.filter(|_| *is_viewed));
-        frame.with_item(Blurred { picture, color: None, depth, coc, crop: composed.crop }).send_to(to, counter)
+        frame
+            .with_item(Blurred { picture, color: None, depth, coc, crop: composed.crop, kept: None })
+            .send_to(to, counter)
     }
 
     /// Submits a frame to the executor, unless it is too late; returns whether it was submitted.
@@ -149,13 +190,20 @@ impl<'a> Stage<'a> {
             plan.set(self.blur.picker.plan());
             return Ok(false);
         }
-        let Composed { crop, original, on_device } = composed;
+        let Composed { crop, original, kept, on_device } = composed;
         frame.trace.quality = self.blur.quality();
         let place =
             self.output_request.as_ref().map_or(PictureLocation::Memory, |output_request| output_request.place());
         // A crop is cut out of the full-colour picture, so YUYV is of no use then.
         let is_yuyv = crop.is_none() && wants_yuyv.load(Ordering::Relaxed);
         let (ticket, quality) = (frame.ticket.id.0, frame.trace.quality.unwrap_or_default());
+        let kept = match kept.map(|kept| self.blur_kept(kept, coc, (ticket, quality))).transpose() {
+            Ok(kept) => kept,
+            Err(error) => {
+                counter.count_dropped(frame.ticket, DropCause::Failed);
+                return Err(error);
+            }
+        };
         let (out, yuyv) = (pools.outs.take(), is_yuyv.then(|| pools.yuyvs.take()));
         let job = Job { ticket, color, depth, coc, quality, place, out, yuyv, on_device };
         let submitted = self.blur.submit(job);
@@ -163,7 +211,7 @@ impl<'a> Stage<'a> {
             counter.count_dropped(frame.ticket, DropCause::Failed);
             return Err(error.into());
         }
-        self.in_flight.push_back(frame.with_item(InFlight { coc, crop, original }));
+        self.in_flight.push_back(frame.with_item(InFlight { coc, crop, original, kept }));
         Ok(true)
     }
 
@@ -190,15 +238,16 @@ impl<'a> Stage<'a> {
         let BlurredFrame { picture, mut color, mut depth, times, reused, .. } = finished;
         self.times.reused += f64::from(reused);
         let (now_ns, began_ns, queueing_ns) = (clock.now_ns(), done.since_ns, done.trace.queueing_ns);
-        let (mut frame, InFlight { coc, crop, original }) = done.take_item(now_ns);
-        frame.trace.blur_ns = self.record_times(&frame, &times, now_ns - began_ns);
+        let (mut frame, InFlight { coc, crop, original, kept }) = done.take_item(now_ns);
+        let (kept, kept_ns) = kept.unzip();
+        frame.trace.blur_ns = self.record_times(&frame, &times, now_ns - began_ns, kept_ns.unwrap_or(0));
         frame.trace.queueing_ns = queueing_ns + (now_ns - began_ns).saturating_sub(frame.trace.blur_ns);
         frame.trace.passes = times;
         if let (Some(mut original), Some(map)) = (original, &mut depth) {
             original.restore(&mut color, map);
         }
         let (color, depth) = (Some(color).filter(|_| *is_viewed), depth.filter(|_| *is_viewed));
-        Ok(frame.with_item(Blurred { picture, color, depth, coc, crop }).send_to(to, counter))
+        Ok(frame.with_item(Blurred { picture, color, depth, coc, crop, kept }).send_to(to, counter))
     }
 
     /// Returns whether a frame is too late if its blur takes `expected_ns`; a frame that was sought never is.
@@ -207,8 +256,9 @@ impl<'a> Stage<'a> {
         late.is_some_and(|late| late.is_late(frame.ticket.captured_ns, frame.since_ns, expected_ns))
     }
 
-    /// Records the times of a finished frame that was in flight for `in_flight_ns`; returns how long its blur took.
-    fn record_times(&mut self, done: &Frame<()>, passes: &PassTimes, in_flight_ns: u64) -> u64 {
+    /// Records the times of a finished frame that was in flight for `in_flight_ns`, after `kept_ns` for what is kept of it;
+    /// returns how long its blur took.
+    fn record_times(&mut self, done: &Frame<()>, passes: &PassTimes, in_flight_ns: u64, kept_ns: u64) -> u64 {
         let mut in_passes_ns = 0;
         for (name, time) in passes.iter() {
             let time_ns = time.as_nanos() as u64;
@@ -216,13 +266,13 @@ impl<'a> Stage<'a> {
             in_passes_ns += time_ns;
         }
         // If the executor times no passes, the time in flight stands for the blur.
-        let blur_ns = if in_passes_ns == 0 { in_flight_ns } else { in_passes_ns };
+        let blur_ns = kept_ns + if in_passes_ns == 0 { in_flight_ns } else { in_passes_ns };
         let quality = done.trace.quality.unwrap_or_default();
         self.times.took.add(blur_ns);
         self.times.quality_counts.add(quality.name());
         self.times.misses += u64::from(blur_ns > self.budget_ns);
         // With overlapping frames, wall time says nothing about a single one.
-        let took_ns = if self.blur.capacity() > 1 { in_passes_ns } else { blur_ns };
+        let took_ns = if self.blur.capacity() > 1 { kept_ns + in_passes_ns } else { blur_ns };
         self.blur.picker.record_blur(quality, took_ns, done.since_ns);
         self.shared.plan.set(self.blur.picker.plan());
         blur_ns

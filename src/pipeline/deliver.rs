@@ -9,6 +9,7 @@ use super::playout::PlayoutDelay;
 use super::{Progress, Shared, StageResult, Trace, View};
 use crate::bokeh::Picture;
 use crate::budget::Quality;
+use crate::depth::backdrop::CutOut;
 use crate::frame::ColorImage;
 use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
@@ -29,6 +30,9 @@ pub(super) struct Stage<'a> {
     cropper: Cropper,
     /// The crop that goes out.
     cropped: ColorImage,
+    /// The crop of what is kept of the picture.
+    cropped_kept: ColorImage,
+    cut_out: CutOut,
 }
 
 impl<'a> Stage<'a> {
@@ -40,8 +44,19 @@ impl<'a> Stage<'a> {
         times: &'a mut SinkTimings,
     ) -> Self {
         let playout = shared.realtime_period_ns.map(PlayoutDelay::new);
-        let (cropper, cropped) = (Cropper::default(), ColorImage::default());
-        Self { sink, view, mirror, progress, playout, shared, times, cropper, cropped }
+        Self {
+            sink,
+            view,
+            mirror,
+            progress,
+            playout,
+            shared,
+            times,
+            cropper: Cropper::default(),
+            cropped: ColorImage::default(),
+            cropped_kept: ColorImage::default(),
+            cut_out: CutOut::default(),
+        }
     }
 
     /// Delivers frames until they end, the sink is closed, or the viewer is gone.
@@ -65,6 +80,7 @@ impl<'a> Stage<'a> {
                 Received::Ended => break,
             };
             let is_cropped = self.crop_and_mirror(&mut frame.item);
+            let has_alpha = self.separate_alpha(&mut frame.item, is_cropped);
             let (mut frame, mut blurred) = frame.take_item(clock.now_ns());
             let captured_ns = frame.ticket.captured_ns;
             // Wait for the frame's play-out time, against jitter.
@@ -75,8 +91,8 @@ impl<'a> Stage<'a> {
             }
             let began_ns = frame.since_ns + frame.trace.playout_ns;
             frame.trace.age_ns = began_ns.saturating_sub(captured_ns);
-            let was_given = match self.write_to_sink(&mut blurred.picture, is_cropped, captured_ns, frame.stamp.time_ns)
-            {
+            let (form, time_ns) = ((is_cropped, has_alpha), frame.stamp.time_ns);
+            let was_given = match self.write_to_sink(&mut blurred.picture, form, captured_ns, time_ns) {
                 Ok(ControlFlow::Continue(was_given)) => was_given,
                 Ok(ControlFlow::Break(())) => break,
                 Err(error) => {
@@ -98,7 +114,7 @@ impl<'a> Stage<'a> {
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
             done.into_iter().for_each(|ticket| counter.count_delivered(ticket));
             if let Some(view) = &mut self.view {
-                let Blurred { picture, color, depth, coc, crop } = blurred;
+                let Blurred { picture, color, depth, coc, crop, .. } = blurred;
                 let frames = counter.frame_counts();
                 let view_of = View {
                     picture,
@@ -143,21 +159,37 @@ impl<'a> Stage<'a> {
     }
 
     /// Crops and mirrors the picture that goes out; returns whether it was cropped.
-    fn crop_and_mirror(&mut self, Blurred { picture, crop, .. }: &mut Blurred) -> bool {
+    fn crop_and_mirror(&mut self, Blurred { picture, crop, kept, .. }: &mut Blurred) -> bool {
         let whole = crop.zip(picture.memory());
         let is_cropped = whole.map(|(crop, whole)| self.cropper.crop(whole, &crop, &mut self.cropped)).is_some();
+        if let Some((crop, kept)) = crop.zip(kept.as_deref()) {
+            self.cropper.crop(kept, &crop, &mut self.cropped_kept);
+        }
         if self.mirror {
             let out = if is_cropped { Some(&mut self.cropped) } else { picture.memory_mut() };
             out.map(mirror_picture);
+            let kept = if is_cropped { Some(&mut self.cropped_kept) } else { kept.as_deref_mut() };
+            kept.map(mirror_picture);
         }
         is_cropped
+    }
+
+    /// Makes straight colours and alpha of the picture that goes out, if its background is transparent and the sink keeps
+    /// that; returns whether it did.
+    fn separate_alpha(&mut self, Blurred { picture, kept, .. }: &mut Blurred, is_cropped: bool) -> bool {
+        let Some(kept) = kept.as_deref().filter(|_| self.sink.keeps_alpha()) else { return false };
+        let (out, kept) = match is_cropped {
+            true => (Some(&mut self.cropped), &self.cropped_kept),
+            false => (picture.memory_mut(), kept),
+        };
+        out.map(|out| self.cut_out.unpremultiply(out, kept)).is_some()
     }
 
     /// Passes a picture to the sink if it is in memory; `Continue` says whether it was.
     fn write_to_sink(
         &mut self,
         picture: &mut Picture,
-        is_cropped: bool,
+        (is_cropped, has_alpha): (bool, bool),
         captured_ns: u64,
         time_ns: u64,
     ) -> Result<ControlFlow<(), bool>, SinkError> {
@@ -166,7 +198,11 @@ impl<'a> Stage<'a> {
             self.sink.write_yuyv(yuyv, time_ns)?
         } else if let Some(whole) = picture.memory() {
             self.sink.set_capture_time(captured_ns);
-            self.sink.write_frame(if is_cropped { &self.cropped } else { whole }, time_ns)?
+            let out = if is_cropped { &self.cropped } else { whole };
+            match has_alpha {
+                true => self.sink.write_with_alpha(out, &self.cut_out.alpha, time_ns)?,
+                false => self.sink.write_frame(out, time_ns)?,
+            }
         } else {
             self.sink.skip_frame();
             return Ok(ControlFlow::Continue(false));

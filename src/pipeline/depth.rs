@@ -157,9 +157,10 @@ impl<'a> Stage<'a> {
         coc: CocField,
     ) -> Frame<Prepared> {
         let Shared { clock, pools, is_viewed, .. } = self.shared;
-        let kept = is_viewed.then_some(&pools.original);
-        let composed =
-            depth.as_mut().map(|map| self.preprocessor.compose(&mut color, map, &coc, frame.stamp.time_ns, kept));
+        let (originals, time_ns) = (is_viewed.then_some(&pools.original), frame.stamp.time_ns);
+        let composed = depth
+            .as_mut()
+            .map(|map| self.preprocessor.compose(&mut color, map, &coc, time_ns, originals, || pools.kept.take()));
         let (began_ns, at_ns) = (mem::replace(&mut frame.since_ns, clock.now_ns()), frame.since_ns);
         frame.trace.depth_ns = at_ns - began_ns;
         let times = depth.is_some().then(|| DepthTimes {
@@ -181,12 +182,13 @@ impl<'a> Stage<'a> {
         stamp: Stamp,
     ) -> Result<Made, Fault> {
         let Shared { clock, pools, output_request, info, .. } = self.shared;
-        if let Some(field) = self.preprocessor.fixed_coc() {
-            return Ok((None, field));
-        }
         let began_ns = clock.now_ns();
+        // Also without depth: the picture's geometry and size do not change with the look.
         if let Some(source) = &mut self.source {
             source.rectify(color);
+        }
+        if let Some(field) = self.preprocessor.fixed_coc() {
+            return Ok((None, field));
         }
         if output_request.as_ref().is_some_and(|output_request| output_request.requires_own_depth()) {
             self.scheduler.iter_mut().for_each(DepthScheduler::discard_held_depth);

@@ -9,7 +9,7 @@ use crate::capture::Camera;
 use crate::clock::Clock;
 use crate::computing::ComputeOptions;
 use crate::depth::DepthSource;
-use crate::engine::{Blur, Engine, Input, Origin, TimeBudget};
+use crate::engine::{Blur, Engine, Input, Origin, Playback, TimeBudget};
 use crate::link::Sender;
 use crate::link::demand::Demand;
 use crate::look::{Look, Reuse};
@@ -173,6 +173,11 @@ impl<'a> Run<'a> {
             frames: info.frames,
             depth: if self.measured { Origin::Measured } else { Origin::Synthesized },
             knows_background: depth.is_some_and(|depth| depth.knows_background()),
+            playback: match (info.frames, self.pace) {
+                (Some(1), _) => Playback::Still,
+                (_, Pace::Asap) => Playback::EveryPicture,
+                (_, Pace::Realtime) => Playback::Realtime,
+            },
             threads: self.threads,
         };
         let time = TimeBudget {

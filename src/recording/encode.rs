@@ -19,12 +19,13 @@ const PNG_FILTER: png::Filter = png::Filter::Paeth;
 
 /// Appends `image` to `file` as PNG, with a fast compression that keeps up with a camera.
 pub(super) fn encode_color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
-    encode_photo_png(image, &PhotoMetadata::default(), file)
+    encode_photo_png((image, None), &PhotoMetadata::default(), file)
 }
 
-/// Appends `image` to `file` as PNG, with its colour profile, EXIF and XMP.
+/// Appends `image` to `file` as PNG, with its alpha channel if there is one (a byte per pixel), colour profile, EXIF and
+/// XMP.
 pub(super) fn encode_photo_png(
-    image: &ColorImage,
+    (image, alpha): (&ColorImage, Option<&[u8]>),
     metadata: &PhotoMetadata,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
@@ -33,12 +34,19 @@ pub(super) fn encode_photo_png(
     info.exif_metadata = metadata.exif.as_deref().map(Cow::Borrowed);
     info.utf8_text.extend(metadata.xmp.as_ref().map(|packet| ITXtChunk::new(xmp::PNG_KEYWORD, packet)));
     let mut encoder = png::Encoder::with_info(file, info)?;
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(PNG_FILTER);
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&image.rgb)?;
+    match alpha {
+        None => writer.write_image_data(&image.rgb)?,
+        Some(alpha) => {
+            let pixels = image.rgb.as_chunks::<3>().0.iter().zip(alpha);
+            let rgba: Vec<u8> = pixels.flat_map(|(&[r, g, b], &alpha)| [r, g, b, alpha]).collect();
+            writer.write_image_data(&rgba)?;
+        }
+    }
     writer.finish()
 }
 

@@ -158,9 +158,25 @@ pub fn write_photo(
     metadata: &PhotoMetadata,
     force: bool,
 ) -> Result<(), RecordingError> {
+    write_photo_with_alpha(path, (image, None), metadata, force)
+}
+
+/// Does the same as [`write_photo`], with an alpha channel if there is one: a byte per pixel, 255 opaque.
+///
+/// # Errors
+/// Same as for [`write_color`]; or a JPEG would need an alpha channel.
+pub fn write_photo_with_alpha(
+    path: &Path,
+    (image, alpha): (&ColorImage, Option<&[u8]>),
+    metadata: &PhotoMetadata,
+    force: bool,
+) -> Result<(), RecordingError> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
-        PhotoFormat::Png => encode::encode_photo_png(image, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Png => {
+            encode::encode_photo_png((image, alpha), metadata, &mut file).map_err(|error| error.to_string())
+        }
+        PhotoFormat::Jpeg if alpha.is_some() => Err("JPEG keeps no transparency; use .png".to_owned()),
         PhotoFormat::Jpeg => encode::encode_photo_jpeg(image, metadata, &mut file).map_err(|error| error.to_string()),
     };
     write(path, encoded, &file, force)

@@ -19,7 +19,7 @@ pub enum SinkError {
     /// The name is not that of a sink.
     #[error(
         "no sink '{name}'{}: use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/ (a folder, with the slash), FILE.y4m, \
-         FILE.mp4, FILE.mkv, FILE.webm, - (y4m on standard output) or null",
+         FILE.mp4, FILE.mkv, FILE.webm, FILE.mov, - (y4m on standard output) or null",
         near.as_ref().map_or(String::new(), |near| format!(" (did you mean {near}?)")),
         if cfg!(feature = "window") { "window, " } else { "" }
     )]
@@ -35,7 +35,7 @@ pub enum SinkError {
     #[error("for y4m on standard output, use -")]
     NameOfStdout,
     /// An existing file that is not a video.
-    #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv or FILE.webm", path.display())]
+    #[error("{} is neither a folder nor a video: give DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm or FILE.mov", path.display())]
     NoFolder { path: PathBuf },
     #[error("{} is {what}, and is not replaced by a file; choose another name{}", path.display(), if *what == "a pipe" { ", or write y4m into it by `--to - > PIPE`" } else { "" })]
     NoFile {
@@ -93,6 +93,9 @@ pub enum SinkError {
     /// A defect of this program.
     #[error("this output received YUYV without requesting it; please report this")]
     Yuyv,
+    /// A defect of this program.
+    #[error("this output received an alpha channel, which it cannot keep; please report this")]
+    Alpha,
     /// The PNG encoder refused.
     #[error("cannot write {} as PNG: {message}", path.display())]
     Png { path: PathBuf, message: String },

@@ -91,6 +91,26 @@ pub trait Sink: Send {
         Err(SinkError::Yuyv)
     }
 
+    /// Whether it keeps the alpha channel of [`Sink::write_with_alpha`].
+    fn keeps_alpha(&self) -> bool {
+        false
+    }
+
+    /// Writes a picture with straight colours and an alpha channel, one byte per pixel row by row, 255 opaque, like
+    /// [`Sink::write_frame`], for sinks that [keep](Sink::keeps_alpha) it.
+    ///
+    /// # Errors
+    /// Those of [`Sink::write_frame`]; the sink keeps no alpha.
+    fn write_with_alpha(
+        &mut self,
+        frame: &ColorImage,
+        alpha: &[u8],
+        time_ns: u64,
+    ) -> Result<ControlFlow<()>, SinkError> {
+        let _ = (frame, alpha, time_ns);
+        Err(SinkError::Alpha)
+    }
+
     /// Sets the capture time, by the clock of the run, of the frame in the next [`Sink::write_frame`] or [`Sink::write_yuyv`]:
     /// for outputs that pass it on.
     fn set_capture_time(&mut self, captured_ns: u64) {
@@ -191,6 +211,14 @@ impl Sink for Null {
         Ok(ControlFlow::Continue(()))
     }
 
+    fn keeps_alpha(&self) -> bool {
+        true
+    }
+
+    fn write_with_alpha(&mut self, _: &ColorImage, _: &[u8], _: u64) -> Result<ControlFlow<()>, SinkError> {
+        Ok(ControlFlow::Continue(()))
+    }
+
     fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
@@ -224,6 +252,8 @@ pub struct Options {
     pub out_size: Option<(u32, u32)>,
     /// Number of encoder threads of a video; `None`: the encoder's default. The resulting bytes may depend on it.
     pub threads: Option<usize>,
+    /// Whether pictures may have an alpha channel.
+    pub alpha: bool,
     /// Receives whether a virtual camera is watched.
     pub demand: Option<Demand>,
     /// For a filter: the name of the PipeWire camera whose readers get the pictures, or a part of it.
@@ -245,6 +275,7 @@ impl Options {
             force: false,
             out_size: None,
             threads: None,
+            alpha: false,
             demand: None,
             filter_target: None,
             sound: None,
@@ -256,4 +287,12 @@ impl Options {
 /// Checks that a frame has the size that the stream's header states.
 fn check_size(made_for: (u32, u32), got: (u32, u32)) -> Result<(), SinkError> {
     if got == made_for { Ok(()) } else { Err(SinkError::Size { made_for, got }) }
+}
+
+/// Writes the pixels of a picture with its alpha to `rgba`, four bytes each.
+fn interleave_alpha<'a>(frame: &ColorImage, alpha: impl IntoIterator<Item = &'a u8>, rgba: &mut Vec<u8>) {
+    rgba.clear();
+    rgba.reserve(frame.rgb.len() / 3 * 4);
+    let pixels = frame.rgb.as_chunks::<3>().0.iter().zip(alpha);
+    pixels.for_each(|(&[r, g, b], &alpha)| rgba.extend_from_slice(&[r, g, b, alpha]));
 }

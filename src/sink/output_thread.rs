@@ -22,6 +22,8 @@ pub(super) struct OutputThread {
     pub name: String,
     /// Whether its pictures are seen as they come.
     pub is_live: bool,
+    /// Whether its sink keeps an alpha channel.
+    pub keeps_alpha: bool,
     /// `None` once no more pictures will come.
     sender: Option<Sender<Arc<Picture>>>,
     shared: Arc<Shared>,
@@ -33,6 +35,8 @@ pub(super) struct OutputThread {
 /// A picture shared by several outputs.
 pub(super) struct Picture {
     image: ColorImage,
+    /// Its alpha channel; empty if it has none.
+    alpha: Vec<u8>,
     /// Time by the clock of the source.
     time_ns: u64,
     /// Capture time by the clock of the run.
@@ -93,6 +97,7 @@ impl OutputThread {
     ) -> io::Result<Self> {
         let (sender, receiver) = if backpressure == Backpressure::DropOldest { link::live() } else { link::lossless() };
         let (name, is_live, node_counters) = (sink.describe(), sink.is_live(), sink.node_counters());
+        let keeps_alpha = sink.keeps_alpha();
         let (shared, sink_name) = (Arc::<Shared>::default(), name.clone());
         let (outcome_sender, outcome) = mpsc::channel();
         let thread_shared = Arc::clone(&shared);
@@ -108,7 +113,7 @@ impl OutputThread {
             let _ = outcome_sender.send(outcome);
         };
         let thread = Some(thread::Builder::new().name("output".into()).spawn(run)?);
-        Ok(Self { name, is_live, sender: Some(sender), shared, outcome, thread, node_counters })
+        Ok(Self { name, is_live, keeps_alpha, sender: Some(sender), shared, outcome, thread, node_counters })
     }
 
     /// Sends a picture. Returns it if a blocking output had no space within `timeout`.
@@ -236,9 +241,13 @@ fn serve_sink(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>
 }
 
 fn write_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
-    let Picture { image, time_ns, captured_ns, is_card } = picture;
+    let Picture { image, alpha, time_ns, captured_ns, is_card } = picture;
     sink.set_capture_time(*captured_ns);
-    let flow = if *is_card { sink.write_card(image, *time_ns)? } else { sink.write_frame(image, *time_ns)? };
+    let flow = match (*is_card, alpha.is_empty()) {
+        (true, _) => sink.write_card(image, *time_ns)?,
+        (false, true) => sink.write_frame(image, *time_ns)?,
+        (false, false) => sink.write_with_alpha(image, alpha, *time_ns)?,
+    };
     if flow.is_continue() {
         shared.frames.fetch_add(1, Ordering::Relaxed);
         // ShutterControl: a reader that sees the card here also sees that the sink has received it.
@@ -254,18 +263,26 @@ pub(super) struct PicturePool {
 }
 
 impl PicturePool {
-    /// Copies `frame` to a picture that outputs can share. Reuses a picture that no output holds any more, if there is
-    /// one.
-    pub fn copy_frame(&mut self, frame: &ColorImage, time_ns: u64, captured_ns: u64, is_card: bool) -> Arc<Picture> {
+    /// Copies `frame`, with its alpha channel if that is not empty, to a picture that outputs can share. Reuses a picture
+    /// that no output holds any more, if there is one.
+    pub fn copy_frame(
+        &mut self,
+        (frame, frame_alpha): (&ColorImage, &[u8]),
+        (time_ns, captured_ns): (u64, u64),
+        is_card: bool,
+    ) -> Arc<Picture> {
         let free = self.pictures.iter_mut().position(|picture| Arc::get_mut(picture).is_some());
         let at = free.unwrap_or_else(|| {
-            self.pictures.push(Arc::new(Picture { image: ColorImage::default(), time_ns, captured_ns, is_card }));
+            let (image, alpha) = Default::default();
+            self.pictures.push(Arc::new(Picture { image, alpha, time_ns, captured_ns, is_card }));
             self.pictures.len() - 1
         });
         if let Some(picture) = Arc::get_mut(&mut self.pictures[at]) {
-            let mut image = mem::take(&mut picture.image);
+            let (mut image, mut alpha) = (mem::take(&mut picture.image), mem::take(&mut picture.alpha));
             image.copy_from(frame);
-            *picture = Picture { image, time_ns, captured_ns, is_card };
+            alpha.clear();
+            alpha.extend_from_slice(frame_alpha);
+            *picture = Picture { image, alpha, time_ns, captured_ns, is_card };
         }
         Arc::clone(&self.pictures[at])
     }

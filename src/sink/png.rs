@@ -1,13 +1,14 @@
 //! A folder of numbered PNG files.
 
 use std::io::{BufWriter, Write};
+use std::mem;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::{Ending, Options, Sink, SinkError};
+use super::{Ending, Options, Sink, SinkError, interleave_alpha};
 use crate::files::atomic_file::PartFile;
 use crate::files::folder::{FileSet, Folder};
 use crate::frame::ColorImage;
@@ -19,6 +20,8 @@ pub struct PngFolder {
     /// `None` once it has ended.
     folder: Option<Folder>,
     next_number: u64,
+    /// A picture with its alpha channel.
+    rgba: Vec<u8>,
 }
 
 impl PngFolder {
@@ -31,23 +34,35 @@ impl PngFolder {
         let contains =
             |name: &str| parse_number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
         let folder = Folder::open(path, options.force, &FileSet { subfolders: &[], contains: &contains })?;
-        Ok(Self { path: path.to_owned(), folder: Some(folder), next_number: 0 })
+        Ok(Self { path: path.to_owned(), folder: Some(folder), next_number: 0, rgba: Vec::new() })
     }
 
-    fn write_png(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
+    /// Writes interleaved `bytes` of a picture of `size`.
+    fn write_png(&mut self, bytes: &[u8], size: (u32, u32), form: ExtendedColorType) -> Result<(), SinkError> {
         let Some(folder) = &mut self.folder else { return Ok(()) };
         let part = folder.create_file(&file_name(self.next_number))?;
-        encode_png(frame, &part)?;
+        encode_png(bytes, size, form, &part)?;
         folder.commit_file(part)?;
         self.next_number += 1;
         Ok(())
     }
+
+    /// Continues after a picture was written, or keeps what was written before it failed.
+    fn check_written(&mut self, written: Result<(), SinkError>) -> Result<ControlFlow<()>, SinkError> {
+        let Err(error) = written else { return Ok(ControlFlow::Continue(())) };
+        // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
+        let kept = self.folder.take().and_then(|folder| folder.finish_incomplete().ok().flatten());
+        Err(match kept {
+            Some(kept) => SinkError::Kept { error: Box::new(error), kept },
+            None => error,
+        })
+    }
 }
 
-fn encode_png(frame: &ColorImage, part: &PartFile) -> Result<(), SinkError> {
+fn encode_png(bytes: &[u8], size: (u32, u32), form: ExtendedColorType, part: &PartFile) -> Result<(), SinkError> {
     let mut buffered = BufWriter::with_capacity(1 << 16, part.file());
     PngEncoder::new_with_quality(&mut buffered, CompressionType::Fast, FilterType::Sub)
-        .write_image(&frame.rgb, frame.width, frame.height, ExtendedColorType::Rgb8)
+        .write_image(bytes, size.0, size.1, form)
         .map_err(|error| match error {
             image::ImageError::IoError(cause) => SinkError::Write { path: part.path().to_owned(), cause },
             other => SinkError::Png { path: part.path().to_owned(), message: other.to_string() },
@@ -67,13 +82,20 @@ fn file_name(number: u64) -> String {
 
 impl Sink for PngFolder {
     fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        let Err(error) = self.write_png(frame) else { return Ok(ControlFlow::Continue(())) };
-        // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
-        let kept = self.folder.take().and_then(|folder| folder.finish_incomplete().ok().flatten());
-        Err(match kept {
-            Some(kept) => SinkError::Kept { error: Box::new(error), kept },
-            None => error,
-        })
+        let written = self.write_png(&frame.rgb, frame.size(), ExtendedColorType::Rgb8);
+        self.check_written(written)
+    }
+
+    fn keeps_alpha(&self) -> bool {
+        true
+    }
+
+    fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], _: u64) -> Result<ControlFlow<()>, SinkError> {
+        let mut rgba = mem::take(&mut self.rgba);
+        interleave_alpha(frame, alpha, &mut rgba);
+        let written = self.write_png(&rgba, frame.size(), ExtendedColorType::Rgba8);
+        self.rgba = rgba;
+        self.check_written(written)
     }
 
     fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {

@@ -13,6 +13,9 @@ use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::stats::{NodeCounts, OutputCounts};
 
+/// Result of writing a picture ([`Sink::write_frame`]).
+type Written = Result<ControlFlow<()>, SinkError>;
+
 /// A sink whose pictures can be blocked through its [`ShutterControl`]. The card is shown at once, also between two frames;
 /// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
 /// frame rate until the next picture.
@@ -115,11 +118,7 @@ impl Shutter {
     }
 
     /// Sends the sink a picture by `write`, or the card while it is closed.
-    fn send_picture(
-        &mut self,
-        time_ns: u64,
-        write: impl FnOnce(&mut Self, u64) -> Result<ControlFlow<()>, SinkError>,
-    ) -> Result<ControlFlow<()>, SinkError> {
+    fn send_picture(&mut self, time_ns: u64, write: impl FnOnce(&mut Self, u64) -> Written) -> Written {
         let closed = self.update_demand();
         let time_ns = self.convert_time_ns(time_ns);
         if closed {
@@ -159,8 +158,15 @@ impl Shutter {
         !self.copy_receivers.is_empty()
     }
 
+    /// Sends copies of a picture to those who asked for one.
+    fn answer_copy_requests(&mut self, frame: &ColorImage) {
+        if self.is_copy_requested() {
+            self.copy_receivers.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
+        }
+    }
+
     /// Sends the sink the card.
-    fn send_card(&mut self, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn send_card(&mut self, time_ns: u64) -> Written {
         self.record_sent(time_ns, true);
         let card = self.card.get_or_init(|| {
             let mut card = ColorImage::new(self.size.0, self.size.1);
@@ -196,11 +202,9 @@ impl Shutter {
 }
 
 impl Sink for Shutter {
-    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Written {
         self.send_picture(time_ns, |shutter, time_ns| {
-            if shutter.is_copy_requested() {
-                shutter.copy_receivers.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
-            }
+            shutter.answer_copy_requests(frame);
             shutter.sink.write_frame(frame, time_ns)
         })
     }
@@ -210,11 +214,22 @@ impl Sink for Shutter {
         !self.is_copy_requested() && self.sink.wants_yuyv()
     }
 
-    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Written {
         self.send_picture(time_ns, |shutter, time_ns| shutter.sink.write_yuyv(frame, time_ns))
     }
 
-    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn keeps_alpha(&self) -> bool {
+        self.sink.keeps_alpha()
+    }
+
+    fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
+        self.send_picture(time_ns, |shutter, time_ns| {
+            shutter.answer_copy_requests(frame);
+            shutter.sink.write_with_alpha(frame, alpha, time_ns)
+        })
+    }
+
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Written {
         self.sink.write_card(card, time_ns)
     }
 

@@ -27,7 +27,7 @@ pub enum Target {
     Stdout,
     /// `FILE.y4m`
     Y4m(PathBuf),
-    /// `FILE.mp4`, `FILE.mkv` or `FILE.webm`, through ffmpeg.
+    /// `FILE.mp4`, `FILE.mkv`, `FILE.webm` or `FILE.mov`, through ffmpeg.
     Video(PathBuf),
     /// `/dev/videoN`, or another name of a device: a virtual camera.
     Device(PathBuf),
@@ -62,7 +62,7 @@ impl FromStr for Target {
             _ if is_device(&path) => Ok(Self::Device(path)),
             _ if name.ends_with('/') || folder::has_file_list(&path) => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
-            (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
+            (_, Some("mp4" | "mkv" | "webm" | "mov")) => Ok(Self::Video(path)),
             // An unknown name must not become a folder: a typo in the name of a camera would fill the disk.
             _ if path.is_dir() => Err(SinkError::NoSlash { name: name.into() }),
             _ if path.exists() => Err(SinkError::NoFolder { path }),
@@ -140,6 +140,15 @@ impl Target {
     /// Whether this is a virtual camera.
     pub fn is_camera(&self) -> bool {
         matches!(self, Self::Device(_) | Self::PipeWire(_) | Self::Filter)
+    }
+
+    /// Whether it keeps an alpha channel.
+    pub fn keeps_alpha(&self) -> bool {
+        match self {
+            Self::Null | Self::Folder(_) => true,
+            Self::Video(path) => Ffmpeg::keeps_alpha_in(path),
+            _ => false,
+        }
     }
 
     /// Whether both write to the same place.

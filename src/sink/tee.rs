@@ -123,11 +123,16 @@ impl Tee {
         }
     }
 
-    /// Sends a picture to each output.
-    fn send_frame(&mut self, frame: &ColorImage, time_ns: u64, is_card: bool) -> Result<ControlFlow<()>, SinkError> {
+    /// Sends a picture to each output, with its alpha channel if that is not empty.
+    fn send_frame(
+        &mut self,
+        frame: (&ColorImage, &[u8]),
+        time_ns: u64,
+        is_card: bool,
+    ) -> Result<ControlFlow<()>, SinkError> {
         self.handle_requests();
         if !self.outputs.is_empty() {
-            let picture = self.picture_pool.copy_frame(frame, time_ns, self.captured_ns, is_card);
+            let picture = self.picture_pool.copy_frame(frame, (time_ns, self.captured_ns), is_card);
             for (_, output) in &mut self.outputs {
                 let mut unsent = output.send(Arc::clone(&picture), TICK);
                 while let Some(picture) = unsent {
@@ -201,11 +206,25 @@ impl Tee {
 
 impl Sink for Tee {
     fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.send_frame(frame, time_ns, false)
+        self.send_frame((frame, &[]), time_ns, false)
     }
 
     fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.send_frame(card, time_ns, true)
+        self.send_frame((card, &[]), time_ns, true)
+    }
+
+    /// Its outputs all do, or none does: a run is refused otherwise.
+    fn keeps_alpha(&self) -> bool {
+        !self.outputs.is_empty() && self.outputs.iter().all(|(_, output)| output.keeps_alpha)
+    }
+
+    fn write_with_alpha(
+        &mut self,
+        frame: &ColorImage,
+        alpha: &[u8],
+        time_ns: u64,
+    ) -> Result<ControlFlow<()>, SinkError> {
+        self.send_frame((frame, alpha), time_ns, false)
     }
 
     fn set_capture_time(&mut self, captured_ns: u64) {

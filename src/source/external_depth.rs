@@ -1,6 +1,7 @@
 //! External depth for a source, from another recording or a depth camera.
 
 use super::opened::recorded_depth_origin;
+use super::orientation::SourceTransform;
 use super::{
     DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera, video,
 };
@@ -10,13 +11,14 @@ use crate::depth::DepthSource;
 use crate::depth::looped_recording::LoopedRecording;
 use crate::recording::Recording;
 
-/// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged.
+/// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged. The
+/// source is transformed already.
 ///
 /// # Errors
 /// The depth cannot be opened, or an option does not apply to it.
 pub(super) fn add_external_depth(
     source: Source,
-    name: &SourceName,
+    (name, transform): (&SourceName, &SourceTransform),
     request: &OpenRequest,
     clock: &Clock,
 ) -> Result<Source, SourceError> {
@@ -47,7 +49,7 @@ pub(super) fn add_external_depth(
         }
         DepthChoice::Video(file) => {
             request.check_relative_depth(DepthOrigin::Relative)?;
-            (Box::new(video::open_depth(file, &source, name, depth)?), DepthOrigin::Relative)
+            (Box::new(video::open_depth(file, transform.own_px, name, depth)?), DepthOrigin::Relative)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
         DepthChoice::SingleCamera(chosen) => return single_camera::add_depth(source, chosen, name, request),
@@ -57,7 +59,9 @@ pub(super) fn add_external_depth(
             );
         }
     };
-    Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
+    // Such depth is of the camera's own pictures.
+    let first_depth = first_depth.map(|map| transform.apply_to_map(map));
+    Ok(Source { depth: Some(transform.apply_to_depth(external)), depth_from, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with scale and registration from the options.

@@ -22,6 +22,7 @@ mod name;
 mod networks;
 mod opened;
 pub mod options;
+pub mod orientation;
 pub mod photo;
 #[cfg(feature = "camera")]
 pub mod registration;
@@ -34,7 +35,8 @@ pub use error::SourceError;
 pub use name::{Kind, SourceName};
 pub use networks::{find_person, installed_networks, reject_metric_look};
 use opened::Opened;
-pub use options::{DepthChoice, Frames, NetworkFile, PlateFile, SingleCameraDepth, Size};
+pub use options::{DepthChoice, Frames, NetworkFile, Orientation, PlateFile, SingleCameraDepth, Size};
+use orientation::SourceTransform;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -164,8 +166,11 @@ impl Source {
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let request = OpenRequest { options, look };
         let source = Self::open_with_own_depth(name, &request)?;
+        // Before networks and plates, which then see the pictures as people do.
+        let transform = SourceTransform::new(options.frames.orientation, &source);
+        let source = transform.apply_to_source(source)?;
         let source = networks::add_network_depth(source, &request);
-        let source = external_depth::add_external_depth(source, name, &request, &Clock::system())?;
+        let source = external_depth::add_external_depth(source, (name, &transform), &request, &Clock::system())?;
         Ok(networks::add_person_detection(source, &request))
     }
 

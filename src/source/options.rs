@@ -3,6 +3,7 @@
 // The help texts contain brackets that are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
+mod orientation;
 mod single_camera;
 
 use std::path::{Path, PathBuf};
@@ -24,6 +25,7 @@ use crate::recording::depth_file::{self, Fit};
 use crate::recording::{DepthUnit, is_recording_file};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
+pub use orientation::Orientation;
 pub use single_camera::{NetworkFile, Networks, PlateFile, SingleCameraDepth};
 #[cfg(feature = "networks")]
 pub use single_camera::{Order, Range};
@@ -69,6 +71,9 @@ pub struct Frames {
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true))]
     pub follow_links: bool,
+    /// How the pictures are turned, flipped and cut.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub orientation: Orientation,
     /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: the best for its connection]
     #[cfg(feature = "camera")]
     #[cfg_attr(feature = "clap", arg(long, value_name = "FOURCC"))]

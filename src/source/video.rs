@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::{Frames, Source, SourceError, SourceName, options};
+use super::{Frames, SourceError, SourceName, options};
 use crate::capture::CaptureError;
 use crate::capture::replay::PlayRange;
 use crate::capture::video::Video;
@@ -102,13 +102,13 @@ pub fn find_sound(path: &Path, frames: &Frames) -> Result<Option<Sound>, SourceE
     Ok((file.has_sound && !frames.repeat).then(|| Sound { path: path.to_owned(), start_s: start_s.max(0.0) }))
 }
 
-/// Opens the depth in the video `file` for the frames of `source`, which is called `name`.
+/// Opens the depth in the video `file` for the frames of the source `name`, of `color_px`.
 ///
 /// # Errors
 /// The source is not a video, or has another number of frames or another aspect ratio; the file is unreadable.
 pub(super) fn open_depth(
     file: &Path,
-    source: &Source,
+    color_px: (u32, u32),
     name: &SourceName,
     options: &options::Depth,
 ) -> Result<VideoDepth, SourceError> {
@@ -127,7 +127,7 @@ pub(super) fn open_depth(
     }
     let near = if options.depth_invert { "black" } else { "white" };
     tracing::info!("{}: relative depth, {near} is near; --depth-invert takes the other end", file.display());
-    Ok(VideoDepth::open(depth, source.camera.info().size, options.depth_invert).map_err(DepthError::from)?)
+    Ok(VideoDepth::open(depth, color_px, options.depth_invert).map_err(DepthError::from)?)
 }
 
 /// Largest change of the aspect ratio that is not mentioned: that of rounding to even sides.

@@ -13,6 +13,7 @@ use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::look::{Effect, Look};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::StereoRig;
 use bokehcam::pipeline::{Fault, Pace, Run, run};
@@ -125,6 +126,20 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
         assert!(received.count() > 0);
         assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[BLURRED] == MARK), "{pace:?}");
     }
+}
+
+#[test]
+fn pictures_are_straightened_for_a_look_without_depth_as_well() {
+    let (stop, received) = (AtomicBool::new(false), Received::default());
+    run(Run {
+        depth: Some(Box::new(Slow { effort: Arc::default(), most: 1 })),
+        bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+        look: Look::with_effect(Effect::Blur),
+        ..simple(Box::new(two_eyes(5)), Box::new(fake_sink(&received)), &stop, Pace::Asap)
+    })
+    .unwrap();
+    assert_eq!(received.count(), 5);
+    assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[BLURRED] == MARK));
 }
 
 /// The square before the wall, once.

@@ -6,6 +6,7 @@ use crate::error::CliError;
 use crate::settings::{changes, unused};
 use bokehcam::control::{self, Answer, Claim, ControlError, Name};
 use bokehcam::controller::{Rules, SourceFacts};
+use bokehcam::depth::backdrop::Background;
 use bokehcam::look::{Look, Patch, Strength};
 use bokehcam::source::{self, DepthOrigin};
 
@@ -68,7 +69,14 @@ fn apply_checked_patch(
             "--effect {effect} needs depth, and this run has none: use --effect blur or tilt-shift"
         )));
     }
+    let was_transparent = look.background == Background::Transparent;
     let look = source::adapt_look(&patch.apply_to(look)?, &facts.depth_choice, facts.has_depth)?;
+    if look.background == Background::Transparent && !was_transparent {
+        return Err(CliError::Usage(
+            "--behind transparent cannot be set while it runs, as outputs are opened for it: start a `stream` with it"
+                .to_owned(),
+        ));
+    }
     let uses_depth = look.effect.follows_depth();
     match facts.depth_from {
         DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => {

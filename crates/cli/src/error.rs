@@ -154,7 +154,7 @@ impl CliError {
             CliError::Usage(_)
                 | CliError::Settings { .. }
                 | CliError::Look(LookError::Lens)
-                | CliError::Bokeh(BokehError::TooWide { .. })
+                | CliError::Bokeh(BokehError::TooWide { .. } | BokehError::Transparent)
         )
     }
 

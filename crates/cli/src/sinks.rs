@@ -8,6 +8,7 @@ use super::error::CliError;
 use super::files::refuse_overwriting_source;
 use super::options::Streaming;
 use bokehcam::files::place;
+use bokehcam::look::BackgroundSetting;
 use bokehcam::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
 use bokehcam::source::{DepthChoice, Frames, SourceName, video};
 
@@ -24,7 +25,17 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
         DepthChoice::Folder(path) | DepthChoice::Video(path) => Some(path.as_path()),
         _ => None,
     };
-    let inputs: Vec<PathBuf> = source.input_paths().into_iter().chain(depth_path.map(Path::to_owned)).collect();
+    let behind = blur.look.0.behind.as_ref();
+    let files = [depth_path, behind.and_then(BackgroundSetting::file)].into_iter().flatten().map(Path::to_owned);
+    let inputs: Vec<PathBuf> = source.input_paths().into_iter().chain(files).collect();
+    if behind.is_some_and(BackgroundSetting::is_transparent)
+        && let Some(target) = targets.iter().find(|target| !target.keeps_alpha())
+    {
+        return usage(format!(
+            "--behind transparent: --to {target} keeps no transparency; use DIR/ (PNG), FILE.webm (VP9) or FILE.mov \
+             (ProRes 4444)"
+        ));
+    }
     for (index, target) in targets.iter().enumerate() {
         for read in &inputs {
             let path = target.path().filter(|_| !target.is_camera());

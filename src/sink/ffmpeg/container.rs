@@ -6,7 +6,7 @@ use std::path::Path;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Container {
-    /// `.mp4`, with its index at the front or in fragments.
+    /// `.mp4` and `.mov`, with its index at the front or in fragments.
     Mp4,
     /// `.mkv` and `.webm`.
     Matroska,

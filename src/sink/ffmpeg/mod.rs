@@ -26,7 +26,8 @@ use crate::video::process::{Process, ProcessEnd};
 /// Longest wait for an encoder to start reading; frames are sent to it in any case.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, with the frames' time stamps.
+/// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, ProRes 4444 in `.mov`, with the frames'
+/// time stamps.
 pub struct Ffmpeg {
     // Fields drop in this order: the process before the file that it writes.
     input: Option<RawVideo<Pipe>>,
@@ -50,7 +51,9 @@ impl Ffmpeg {
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let output = OutputFile::create(path, options.force)?;
         let format = Format::for_path(path);
-        let mut command = command::encode_command(&format, output.part_path(), options.size.1, options.threads);
+        let alpha = options.alpha && format.keeps_alpha();
+        let form = (options.size.1, alpha);
+        let mut command = command::encode_command(&format, output.part_path(), form, options.threads);
         let mut process = Process::start(&mut command, &options.stop).map_err(|cause| match cause.kind() {
             ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
             _ => SinkError::Write { path: path.to_owned(), cause },
@@ -60,7 +63,7 @@ impl Ffmpeg {
             Some(stdin) => Pipe::from_owned(OwnedFd::from(stdin), move |blocked| !watchdog.is_hung(blocked)),
             None => Err(ErrorKind::BrokenPipe.into()),
         };
-        let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns));
+        let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns, alpha));
         let input = input.map_err(SinkError::write(path))?;
         input.writer.wait_drained(STARTUP_TIMEOUT).map_err(SinkError::write(path))?;
         Ok(Self {
@@ -74,6 +77,11 @@ impl Ffmpeg {
             span_ns: None,
             stop: Arc::clone(&options.stop),
         })
+    }
+
+    /// Whether a file of this name keeps an alpha channel.
+    pub fn keeps_alpha_in(path: &Path) -> bool {
+        Format::for_path(path).keeps_alpha()
     }
 
     /// Closes the input of ffmpeg and waits for its end, or kills it if it `is_hung`; then checks its file.
@@ -99,8 +107,8 @@ impl Ffmpeg {
                 ),
             }
         }
-        if self.format.container == Container::Mp4 {
-            match self.copy(command::faststart_command) {
+        if let Some(muxer) = self.format.faststart() {
+            match self.copy(|from, to| command::faststart_command(muxer, from, to)) {
                 Ok(part) => self.output.replace_part(part),
                 Err(error) => tracing::info!("{}: its index stays fragmented: {error}", self.output.path().display()),
             }
@@ -114,6 +122,34 @@ impl Ffmpeg {
         let mut command = command(self.output.part_path(), part.part_path());
         let ended = Process::start(&mut command, &self.stop).and_then(|mut process| process.wait());
         check_outcome(ended, path, part.part_path(), self.format.container).map(|()| part)
+    }
+
+    /// Writes a frame; without an alpha channel, it is opaque.
+    fn write(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        check_size(self.size, frame.size())?;
+        let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
+        if let Err(error) = self.output.check_exists() {
+            // It still completes the file, which can be copied; its result adds no information.
+            let _ = self.finish_encoding(false);
+            return Err(self.output.fail(error));
+        }
+        let Err(cause) = input.write_frame(frame, alpha, time_ns) else {
+            self.output.frames += 1;
+            self.span_ns = Some((self.span_ns.map_or(time_ns, |(first_ns, _)| first_ns), time_ns));
+            return Ok(ControlFlow::Continue(()));
+        };
+        let path = self.output.path().to_owned();
+        let error = match cause.kind() {
+            // ffmpeg closes its input only by exiting: its exit status is more informative than the broken pipe.
+            ErrorKind::BrokenPipe | ErrorKind::TimedOut => {
+                match self.finish_encoding(cause.kind() == ErrorKind::TimedOut) {
+                    Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), stderr: String::new() },
+                    Err(error) => error,
+                }
+            }
+            _ => SinkError::Write { path, cause },
+        };
+        Err(self.output.fail(error))
     }
 }
 
@@ -150,30 +186,20 @@ fn check_outcome(
 
 impl Sink for Ffmpeg {
     fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        check_size(self.size, frame.size())?;
-        let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
-        if let Err(error) = self.output.check_exists() {
-            // It still completes the file, which can be copied; its result adds no information.
-            let _ = self.finish_encoding(false);
-            return Err(self.output.fail(error));
-        }
-        let Err(cause) = input.write_frame(frame, time_ns) else {
-            self.output.frames += 1;
-            self.span_ns = Some((self.span_ns.map_or(time_ns, |(first_ns, _)| first_ns), time_ns));
-            return Ok(ControlFlow::Continue(()));
-        };
-        let path = self.output.path().to_owned();
-        let error = match cause.kind() {
-            // ffmpeg closes its input only by exiting: its exit status is more informative than the broken pipe.
-            ErrorKind::BrokenPipe | ErrorKind::TimedOut => {
-                match self.finish_encoding(cause.kind() == ErrorKind::TimedOut) {
-                    Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), stderr: String::new() },
-                    Err(error) => error,
-                }
-            }
-            _ => SinkError::Write { path, cause },
-        };
-        Err(self.output.fail(error))
+        self.write(frame, &[], time_ns)
+    }
+
+    fn keeps_alpha(&self) -> bool {
+        self.input.as_ref().is_some_and(RawVideo::has_alpha)
+    }
+
+    fn write_with_alpha(
+        &mut self,
+        frame: &ColorImage,
+        alpha: &[u8],
+        time_ns: u64,
+    ) -> Result<ControlFlow<()>, SinkError> {
+        self.write(frame, alpha, time_ns)
     }
 
     fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {

@@ -1,12 +1,13 @@
 //! Uncompressed video with time stamps for ffmpeg: an endless Matroska stream with one frame per cluster.
 //!
-//! Elements are those of RFC 9559; the codec is `V_UNCOMPRESSED`, I420.
+//! Elements are those of RFC 9559; the codec is `V_UNCOMPRESSED`, I420 or RGBA.
 
 use std::io::{self, Write};
 
 use crate::color::YcbcrMatrix;
 use crate::frame::ColorImage;
 use crate::layout::Range;
+use crate::sink::interleave_alpha;
 use crate::sink::yuv::Converter;
 
 /// Time stamps are in microseconds.
@@ -17,7 +18,10 @@ const MIN_TICKS: u64 = 1000;
 /// A stream of raw frames.
 pub(super) struct RawVideo<W: Write> {
     pub(super) writer: W,
-    converter: Converter,
+    /// `None` for RGBA.
+    converter: Option<Converter>,
+    /// A picture with its alpha channel.
+    rgba: Vec<u8>,
     /// Time of the first frame.
     first_ns: Option<u64>,
     /// Time of the last frame, in ticks after the first.
@@ -27,27 +31,37 @@ pub(super) struct RawVideo<W: Write> {
 }
 
 impl<W: Write> RawVideo<W> {
-    /// Creates a stream into `writer` of frames of `size` that usually come every `period_ns`. Writes its header at once.
-    pub(super) fn new(mut writer: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
-        let matrix = YcbcrMatrix::for_height(size.1);
+    /// Creates a stream into `writer` of frames of `size` that usually come every `period_ns`, with an alpha
+    /// channel if `has_alpha`. Writes its header at once.
+    pub(super) fn new(mut writer: W, size: (u32, u32), period_ns: u64, has_alpha: bool) -> io::Result<Self> {
+        let matrix = Some(YcbcrMatrix::for_height(size.1)).filter(|_| !has_alpha);
         writer.write_all(&encode_header(size, period_ns, matrix))?;
         Ok(Self {
             writer,
-            converter: Converter::new(matrix, Range::Limited),
+            converter: matrix.map(|matrix| Converter::new(matrix, Range::Limited)),
+            rgba: Vec::new(),
             first_ns: None,
             last_ticks: None,
             bytes: Vec::new(),
         })
     }
 
-    /// Writes a frame captured at `time_ns`, as a cluster of its own.
-    pub(super) fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
+    /// Whether frames have an alpha channel.
+    pub(super) fn has_alpha(&self) -> bool {
+        self.converter.is_none()
+    }
+
+    /// Writes a frame captured at `time_ns`, as a cluster of its own. `alpha` is one byte per pixel; empty is opaque.
+    pub(super) fn write_frame(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> io::Result<()> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
         let ticks = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
         let ticks = self.last_ticks.map_or(ticks, |last| ticks.max(last + MIN_TICKS));
         self.last_ticks = Some(ticks);
         let (width, height) = (frame.width as usize, frame.height as usize);
-        let picture_bytes = width * height + 2 * width.div_ceil(2) * height.div_ceil(2);
+        let picture_bytes = match self.has_alpha() {
+            true => 4 * width * height,
+            false => width * height + 2 * width.div_ceil(2) * height.div_ceil(2),
+        };
         let time = encode_element(TIMESTAMP, &ticks.to_be_bytes());
         // Track 1, at the time of the cluster, a key frame.
         let block_head = [0x81, 0, 0, 0x80];
@@ -56,7 +70,14 @@ impl<W: Write> RawVideo<W> {
         self.bytes.extend_from_slice(&time);
         append_element_head(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
         self.bytes.extend_from_slice(&block_head);
-        self.converter.append_planes(frame, &mut self.bytes);
+        match &mut self.converter {
+            Some(converter) => converter.append_planes(frame, &mut self.bytes),
+            None => {
+                let opaque = std::iter::repeat(&u8::MAX).take(if alpha.is_empty() { width * height } else { 0 });
+                interleave_alpha(frame, alpha.iter().chain(opaque), &mut self.rgba);
+                self.bytes.extend_from_slice(&self.rgba);
+            }
+        }
         let written = self.writer.write_all(&self.bytes);
         self.bytes.clear();
         written
@@ -85,15 +106,16 @@ fn encode_element(id: &[u8], content: &[u8]) -> Vec<u8> {
 }
 
 /// Builds everything before the first cluster: the EBML header, and the head of an endless segment with its info and
-/// one track.
-fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatrix) -> Vec<u8> {
+/// one track, of RGBA if there is no `matrix`.
+fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: Option<YcbcrMatrix>) -> Vec<u8> {
     let number = |id: &[u8], value: u64| encode_element(id, &value.to_be_bytes());
     let master_element = |id: &[u8], parts: &[Vec<u8>]| encode_element(id, &parts.concat());
     // Codes of ITU-T H.273.
-    let color = match matrix {
-        YcbcrMatrix::Bt601 => 6,
-        YcbcrMatrix::Bt709 => 1,
-        YcbcrMatrix::Bt2020 => 9,
+    let (color, layout) = match matrix {
+        Some(YcbcrMatrix::Bt601) => (6, b"I420"),
+        Some(YcbcrMatrix::Bt709) => (1, b"I420"),
+        Some(YcbcrMatrix::Bt2020) => (9, b"I420"),
+        None => (0, b"RGBA"),
     };
     // Matrix, chroma siting (in the centre of four pixels, both ways), limited range, transfer, primaries.
     let colour = master_element(
@@ -113,8 +135,8 @@ fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: YcbcrMatri
         &[
             number(&[0xb0], width.into()),
             number(&[0xba], height.into()),
-            encode_element(&[0x2e, 0xb5, 0x24], b"I420"),
-            colour,
+            encode_element(&[0x2e, 0xb5, 0x24], layout),
+            if matrix.is_some() { colour } else { Vec::new() },
         ],
     );
     let track = master_element(

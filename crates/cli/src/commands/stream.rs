@@ -32,6 +32,7 @@ use bokehcam::compute::Backend;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::control::{Claim, Name, Status};
 use bokehcam::controller::SourceFacts;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
@@ -81,12 +82,12 @@ pub struct StreamCommand {
 
 #[cfg(feature = "window")]
 const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
-                  pipewire:NAME), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or \
-                  .webm (ffmpeg), or null; may be given more than once";
+                  pipewire:NAME), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv, \
+                  .webm or .mov (ffmpeg), or null; may be given more than once";
 #[cfg(not(feature = "window"))]
 const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
-                  pipewire:NAME), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm \
-                  (ffmpeg), or null; may be given more than once";
+                  pipewire:NAME), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv, .webm \
+                  or .mov (ffmpeg), or null; may be given more than once";
 
 /// Runs the command; `given` serves warnings and the window. The report is written whenever the pipeline ran, even if
 /// it failed.
@@ -189,6 +190,7 @@ impl StreamCommand {
             force: output.force,
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,
+            alpha: opened.look.background == Background::Transparent,
             demand: demand.cloned(),
             filter_target: self.source.pipewire_name().map(str::to_owned),
             sound: sinks::find_sound(&self.to, &self.source, &self.parts.frames)?,

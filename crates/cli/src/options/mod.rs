@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{BoolishValueParser, OsStringValueParser, RangedI64ValueParser, TypedValueParser};
 
-pub use bokehcam::source::options::{Depth, Frames, Networks, Stereo};
+pub use bokehcam::source::options::{Depth, Frames, Networks, Orientation, Stereo};
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named_value_parser};
 

@@ -13,6 +13,7 @@ mod program;
 mod store;
 
 mod batch;
+mod behind;
 mod cli;
 mod ctl;
 #[cfg(feature = "lab")]
@@ -29,6 +30,7 @@ mod gpu_faults;
 mod heic;
 #[cfg(feature = "networks")]
 mod networks;
+mod orientation;
 mod outputs;
 mod packaging;
 mod plate;

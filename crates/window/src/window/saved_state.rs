@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::state::Preferences;
 use bokehcam::files::{atomic_file, input};
-use bokehcam::look::{Look, Patch};
-use bokehcam::recording::RecordingError;
+use bokehcam::look::{Look, LookError, Patch};
 use bokehcam::source::{Kind, SourceName};
 
 /// State saved at the end of a preview.
@@ -72,18 +71,17 @@ impl SavedState {
     pub fn restore_look(&self, mut on_missing: impl FnMut(String)) -> Option<Look> {
         let settings = self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()));
         let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
-        let mut is_missing =
-            |read: Result<(), RecordingError>| read.map_err(|error| on_missing(error.to_string())).is_err();
+        let mut is_missing = |read: Result<(), LookError>| read.map_err(|error| on_missing(error.to_string())).is_err();
         patch.behind = patch.behind.filter(|name| !is_missing(name.load().map(drop)));
-        patch.aperture = patch.aperture.filter(|name| !is_missing(name.load().map(drop)));
+        patch.aperture = patch.aperture.filter(|name| !is_missing(name.load().map(drop).map_err(LookError::from)));
         patch.apply_to(&Look::default()).ok()
     }
 
     /// Sets the look.
     pub fn set_look(&mut self, look: &Look) {
-        let portable = |value: String| match value.strip_prefix("image:") {
-            Some(file) => format!("image:{}", absolute_name(file)),
-            None => value,
+        let portable = |value: String| match value.split_once(':') {
+            Some((kind @ ("image" | "video"), file)) => format!("{kind}:{}", absolute_name(file)),
+            _ => value,
         };
         let values = Patch::from_look(look).values().into_iter();
         self.look = values.map(|(name, value)| (name.to_owned(), portable(value))).collect();

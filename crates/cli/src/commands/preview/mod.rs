@@ -21,7 +21,7 @@ use bokehcam::compute::Backend;
 use bokehcam::control::Name;
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Effect, Look};
+use bokehcam::look::{BackgroundSetting, Effect, Look};
 use bokehcam::pipeline::Pace;
 use bokehcam::sink::Target;
 use bokehcam::source::{self, SourceName};
@@ -51,8 +51,8 @@ pub struct PreviewCommand {
     /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a photo (PNG or JPEG), `demo` (the
     /// demonstration) or `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
     source: Option<String>,
-    /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or
-    /// .webm from the start; may be given more than once
+    /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv,
+    /// .webm or .mov from the start; may be given more than once
     #[arg(long, value_name = "SINK")]
     to: Vec<Target>,
     /// Name of this run for `bokehcam ctl` [default: preview, or preview-2 and so on]
@@ -97,6 +97,12 @@ pub fn show_source(
     }
     if stream.on_demand {
         return refuse("--on-demand: the window always watches; leave --on-demand out, or use `bokehcam stream`");
+    }
+    if parts.blur.look.0.behind.as_ref().is_some_and(BackgroundSetting::is_transparent) {
+        return refuse(
+            "--behind transparent: a window shows no transparency; `bokehcam stream SOURCE --to FILE.webm` (or FILE.mov, \
+             or DIR/ for PNG) writes it",
+        );
     }
     if !name.is_empty() {
         let source = SourceName::from_str(name).map_err(|error| error.with_prefix(name))?;

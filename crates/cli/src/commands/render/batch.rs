@@ -10,7 +10,7 @@ use std::thread;
 
 use super::listing::{Picture, list_pictures};
 use super::map_folder::MapFolder;
-use super::{RenderCommand, Rendered, build_look, input_files, render};
+use super::{RenderCommand, RenderedFile, build_look, input_files, render};
 use crate::error::CliError;
 use crate::files::{refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::log::{self, Remark};
@@ -19,6 +19,7 @@ use crate::settings::layers::GivenSettings;
 use crate::terminal::{Progress, print_to_stderr, stop_flag_between};
 use bokehcam::compute::{Backend, memory};
 use bokehcam::computing::ExecutorFactory;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::files::place;
 use bokehcam::look::Look;
 use bokehcam::source::DepthChoice;
@@ -32,7 +33,7 @@ const AT_ONCE_ON_GPU: usize = 3;
 
 /// What became of a picture.
 enum Outcome {
-    Written(Rendered),
+    Written(RenderedFile),
     /// The result was there, perhaps older than the picture.
     Kept {
         is_older: bool,
@@ -64,7 +65,7 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
         depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &["-depth", ".depth", ""])).transpose()?,
         mask: mask.map(|dir| MapFolder::read("--mask", dir, &["-mask", ".mask", ""])).transpose()?,
     };
-    let pictures = list_pictures(&command.images, &command.out)?;
+    let pictures = list_pictures(&command.images, &command.out, look.background == Background::Transparent)?;
     refuse_overwriting_inputs(command, &maps, &pictures)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
     warn_of_leftovers([command.out.as_path()]);
@@ -79,7 +80,7 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
             && let Some(picture) = pictures.get(at)
         {
             let (outcome, remarks) = log::hold_remarks(|| process(&command, &maps, picture, &look, given));
-            if let (Outcome::Written(Rendered { executor, depth_by }), 1..) = (&outcome, global.verbose) {
+            if let (Outcome::Written(RenderedFile { executor, depth_by }), 1..) = (&outcome, global.verbose) {
                 let by = depth_by.as_ref().map_or(String::new(), |by| format!(", depth by {by}"));
                 print_to_stderr(&format!("{}: written ({executor}{by})", picture.target.display()));
             }

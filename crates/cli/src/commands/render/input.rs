@@ -14,6 +14,7 @@ use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
 use bokehcam::recording::{PhotoMetadata, snapshot, still};
+use bokehcam::source::orientation::transform_picture;
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
 
@@ -51,16 +52,19 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         (image, _) => (image.clone().unwrap_or_default(), None),
     };
     let (color, metadata) = still::read_photo(&image)?;
+    // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
+    let own_px = color.size();
+    let color = transform_picture(command.orientation, &image.display().to_string(), color)?;
     let mut input = Input { color, metadata, depth: None, depth_from: DepthOrigin::Nothing, found: None };
-    if let Some(made) = compute_depth(command, look, &input.color)? {
+    if let Some(made) = compute_depth(command, look, (&input.color, own_px))? {
         // Masks and networks have their own scale.
         (input.depth, input.depth_from) = (Some(made), DepthOrigin::Metres);
     } else if let Some(file) = &command.depth_map {
-        let (mut map, from) = read_depth(file, command, look, &input.color)?;
+        let (mut map, from) = read_depth(file, command, look, own_px)?;
         source::find_person(&command.source_options(), look, &input.color, &mut map);
         (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
     } else if let Some(file) = kept_depth {
-        let (map, from) = read_depth(&file, command, look, &input.color)?;
+        let (map, from) = read_depth(&file, command, look, own_px)?;
         (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
     } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
         find_depth(&image, command, look, &mut input)?;
@@ -83,8 +87,13 @@ fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut In
     Ok(())
 }
 
-/// Computes depth from a mask or by networks; returns `None` if neither is requested.
-fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
+/// Computes depth from a mask or by networks; returns `None` if neither is requested. `own_px` is the size of the
+/// picture in its file.
+fn compute_depth(
+    command: &RenderCommand,
+    look: &Look,
+    (color, own_px): (&ColorImage, (u32, u32)),
+) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
         (_, DepthChoice::SingleCamera(_) | DepthChoice::Defocus) if is_given => {
@@ -95,8 +104,9 @@ fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Re
         (Some(file), _) => {
             source::reject_metric_look(look, "a mask gives")?;
             let (width, height, share) = still::read_grey(file)?;
-            still::check_mask_size(file, (width, height), color.size())?;
+            still::check_mask_size(file, (width, height), own_px)?;
             let mask = Mask { width, height, alpha: share };
+            let mask = command.orientation.transform().apply_to_mask(&mask, own_px);
             plausible::warn_of_mask(file, &mask, color);
             let outline = Outline {
                 grow_px: command.mask_grow,
@@ -123,7 +133,7 @@ fn compute_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Re
     }
 }
 
-/// Reads the depth map `file` for the picture `color`, and says what was assumed.
+/// Reads the depth map `file` for a picture that is `own_px` large in its file, and says what was assumed.
 ///
 /// # Errors
 /// The file cannot be read, or the look needs metres and its distances are only relative.
@@ -131,9 +141,9 @@ fn read_depth(
     file: &Path,
     command: &RenderCommand,
     look: &Look,
-    color: &ColorImage,
+    own_px: (u32, u32),
 ) -> Result<(DepthMap, DepthOrigin), CliError> {
-    let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, color.size())?;
+    let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, own_px)?;
     let origin = DepthOrigin::from(distances);
     if origin.is_relative() {
         let hint = match command.depth.depth_unit {
@@ -143,5 +153,5 @@ fn read_depth(
         source::reject_metric_look(look, &format!("{} has relative depth{hint}, which gives", file.display()))?;
     }
     notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
-    Ok((map, origin))
+    Ok((command.orientation.transform().transform_map(map, own_px), origin))
 }

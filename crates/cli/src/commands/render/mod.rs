@@ -8,7 +8,7 @@ mod listing;
 mod map_folder;
 
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
 
@@ -27,9 +27,11 @@ use crate::settings::unused::FrameOrigin;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::EdgeAlignment;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::misalignment::Misalignment;
-use bokehcam::engine::{self, still::Depth};
+use bokehcam::engine;
+use bokehcam::engine::still::{Depth, Rendered};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
@@ -95,6 +97,8 @@ pub struct RenderCommand {
     #[arg(long, value_name = "DIR")]
     debug_dir: Option<PathBuf>,
     #[command(flatten)]
+    orientation: options::Orientation,
+    #[command(flatten)]
     blur: options::Blur,
     #[command(flatten)]
     depth: options::Depth,
@@ -117,9 +121,10 @@ pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSe
     command.image = command.images.pop();
     check_outputs(&command)?;
     let look = build_look(&command)?;
+    check_transparency(&command, &look)?;
     create_parent_folder(&command.out)?;
     warn_of_leftovers([command.out.as_path()]);
-    let Rendered { executor, depth_by } = render(&command, &look, given)?;
+    let RenderedFile { executor, depth_by } = render(&command, &look, given)?;
     if !global.quiet {
         depth_by.iter().for_each(|by| terminal::print_to_stderr(&format!("depth by {by}")));
         terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
@@ -158,11 +163,28 @@ fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
             DepthChoice::suggest_keyword(&name)
         )));
     }
-    look::build_look(&command.blur, &command.computing.quality)
+    let look = look::build_look(&command.blur, &command.computing.quality)?;
+    if let Background::Video(video) = &look.background {
+        log::note(&format!("--behind video:{}: a picture shows its first frame", video.file.path.display()));
+    }
+    if look.background == Background::Transparent && command.debug_dir.is_some() {
+        let what = "--debug-dir shows a blur over a background: leave --behind transparent out";
+        return Err(CliError::Usage(what.to_owned()));
+    }
+    Ok(look)
+}
+
+/// Refuses a result that keeps no transparency, if the look's background is transparent.
+fn check_transparency(command: &RenderCommand, look: &Look) -> Result<(), CliError> {
+    if look.background == Background::Transparent && still::photo_format(&command.out)? == PhotoFormat::Jpeg {
+        let out = command.out.display();
+        return Err(CliError::Usage(format!("--behind transparent: {out}: JPEG keeps no transparency; use .png")));
+    }
+    Ok(())
 }
 
 /// How a picture was rendered.
-struct Rendered {
+struct RenderedFile {
     /// Description of the executor.
     executor: String,
     /// Origin of depth that was found in or beside the photo.
@@ -170,7 +192,7 @@ struct Rendered {
 }
 
 /// Blurs the command's only picture, and writes the result.
-fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<Rendered, CliError> {
+fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<RenderedFile, CliError> {
     let Input { color, metadata, depth, depth_from, found } = read_input(command, look)?;
     let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
     let look = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
@@ -186,20 +208,24 @@ fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result
         _ => look,
     };
     let computing = command.computing.to_compute_options();
-    let (result, executor) = match &command.debug_dir {
-        Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
-        None => engine::still::blur_picture(&look, color, depth, &computing)?,
+    let Rendered { color, alpha, by } = match &command.debug_dir {
+        Some(dir) => {
+            let (color, by) = debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?;
+            Rendered { color, alpha: None, by }
+        }
+        None => engine::still::render_picture(&look, color, depth, &computing)?,
     };
     // The metadata's thumbnail would show the unblurred picture.
     let mut metadata = metadata.without_thumbnail();
     if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
         metadata = metadata.for_jpeg();
     }
-    still::write_photo(&command.out, &result, &metadata, command.output.force)?;
+    let picture = (&color, alpha.as_deref());
+    still::write_photo_with_alpha(&command.out, picture, &metadata, command.output.force)?;
     if !metadata.lost_properties.is_empty() {
         log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
     }
-    Ok(Rendered { executor, depth_by: found.map(|found| found.by) })
+    Ok(RenderedFile { executor: by, depth_by: found.map(|found| found.by) })
 }
 
 impl RenderCommand {
@@ -208,6 +234,7 @@ impl RenderCommand {
         source::Options {
             // Only depth cameras have a calibration file.
             depth: options::Depth { depth_calibration: None, ..self.depth.clone() },
+            frames: options::Frames { orientation: self.orientation, ..options::Frames::default() },
             networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
             computing: self.computing.to_compute_options(),
@@ -304,6 +331,7 @@ fn input_files(command: &RenderCommand) -> Vec<PathBuf> {
         .chain(plate)
         .chain(aperture)
         .cloned()
+        .chain(command.blur.look.0.behind.iter().filter_map(|behind| behind.file().map(Path::to_owned)))
         .chain(command.image.iter().flat_map(|image| photo::photo_files(image)))
         .chain(snapshot_files)
         .collect()

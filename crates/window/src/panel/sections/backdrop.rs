@@ -15,6 +15,8 @@ enum BackgroundKind {
     Blurred,
     Color,
     Picture,
+    Video,
+    Transparent,
 }
 
 const KINDS: [(&str, &str, BackgroundKind); 3] = [
@@ -35,12 +37,19 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
         Background::Blur => BackgroundKind::Blurred,
         Background::Color(_) => BackgroundKind::Color,
         Background::Picture(_) => BackgroundKind::Picture,
+        Background::Video(_) => BackgroundKind::Video,
+        Background::Transparent => BackgroundKind::Transparent,
     };
     let named = match &form.state.first_look.background {
         Background::Picture(picture) => Some(Background::Picture(picture.clone())),
         _ => None,
     };
-    let shown = KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name));
+    let shown = match kind {
+        // The command line and presets alone choose these.
+        BackgroundKind::Video => tr("Video"),
+        BackgroundKind::Transparent => tr("Transparent"),
+        kind => KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name)),
+    };
     let shown = tr_with("Background: {}", &[&shown]);
     let all = KINDS.map(|(name, hint, kind)| (tr(name).to_owned(), hint, kind));
     let enabled = form.follows_depth();
@@ -51,6 +60,7 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
             (BackgroundKind::Color, _) => form.look.background = Background::Color(GREEN),
             (BackgroundKind::Picture, Some(named)) => form.look.background = named,
             (BackgroundKind::Picture, None) => form.push_action(Action::Browse(PathKind::Background)),
+            (BackgroundKind::Video | BackgroundKind::Transparent, _) => {}
         }
         form.mark_changed(true, "behind");
     }
@@ -60,6 +70,10 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     match form.look.background.clone() {
         Background::Blur => {}
+        Background::Video(video) => add_path(ui, &video.file.path.display().to_string()),
+        Background::Transparent => {
+            add_remark(ui, "Shown as black here. PNG, WebM and MOV keep the transparency.");
+        }
         Background::Picture(picture) => {
             picture.file.iter().for_each(|file| add_path(ui, &file.display().to_string()));
             form.add_button(ui, "Choose picture…", "Another picture of your own", Action::Browse(PathKind::Background));

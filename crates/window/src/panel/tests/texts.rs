@@ -13,7 +13,7 @@ use bokehcam::look::{Effect, FramingZoom, Strength};
 
 /// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 17] = [
+    let changes: [&dyn Fn(&mut State); 18] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -34,6 +34,7 @@ fn windows() -> Vec<Window> {
         &|state| {
             (state.look.background, state.look.follow) = (Background::Color([1, 2, 3]), FramingZoom::from_zoom(2.0));
         },
+        &|state| state.look.background = Background::Transparent,
         &|state| state.help = true,
         &|state| {
             let Source::Running(running) = &mut state.source else { return };

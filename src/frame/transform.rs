@@ -1,0 +1,347 @@
+//! Turns, flips and cuts pictures, and the maps and masks that belong to them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{ColorImage, DepthMap, Mask};
+use crate::names::named;
+
+named! {
+    /// A clockwise rotation.
+    pub enum Rotation default None {
+        /// As the camera delivers it
+        None = "0",
+        /// A quarter turn clockwise
+        Quarter = "90",
+        /// Upside down
+        Half = "180",
+        /// A quarter turn anticlockwise
+        ThreeQuarters = "270",
+    }
+}
+
+named! {
+    /// A reflection.
+    pub enum Flip default None {
+        /// As the camera delivers it
+        None = "none",
+        /// Left and right are swapped
+        Horizontal = "horizontal",
+        /// Top and bottom are swapped
+        Vertical = "vertical",
+    }
+}
+
+/// A part of a picture, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// Width, at least 1.
+    pub width: u32,
+    /// Height, at least 1.
+    pub height: u32,
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+}
+
+impl FromStr for Area {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parse = || {
+            let (size, place) = text.split_once('+')?;
+            let ((width, height), (x, y)) = (size.split_once(['x', 'X'])?, place.split_once('+')?);
+            let number = |text: &str| text.bytes().all(|c| c.is_ascii_digit()).then(|| text.parse().ok())?;
+            let area = Self { width: number(width)?, height: number(height)?, x: number(x)?, y: number(y)? };
+            (area.width > 0 && area.height > 0).then_some(area)
+        };
+        parse().ok_or_else(|| "use WIDTHxHEIGHT+X+Y in pixels, such as 1280x720+320+180".to_owned())
+    }
+}
+
+impl fmt::Display for Area {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { width, height, x, y } = self;
+        write!(f, "{width}x{height}+{x}+{y}")
+    }
+}
+
+/// Rotates a picture clockwise, then flips it, then cuts an area out of the result. The default changes nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Transform {
+    /// The rotation.
+    pub rotation: Rotation,
+    /// The reflection of the rotated picture.
+    pub flip: Flip,
+    /// The area to keep, in pixels of the rotated picture; `None` keeps all.
+    pub area: Option<Area>,
+}
+
+/// Side of the square tiles in which rows become columns, in pixels: source and destination stay in the cache.
+const TILE_PX: usize = 32;
+
+impl Transform {
+    /// Returns whether pictures stay as they are.
+    pub fn is_identity(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns the size of a picture of `size` once it is rotated.
+    pub fn rotated_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self.rotation {
+            Rotation::None | Rotation::Half => (width, height),
+            Rotation::Quarter | Rotation::ThreeQuarters => (height, width),
+        }
+    }
+
+    /// Returns the area of the rotated picture that is kept; `None` if it lies outside of pictures of `size`.
+    fn area_in(&self, size: (u32, u32)) -> Option<Area> {
+        let (width, height) = self.rotated_size(size);
+        let area = self.area.unwrap_or(Area { width, height, x: 0, y: 0 });
+        let is_within = |begin: u32, length: u32, side: u32| begin.checked_add(length).is_some_and(|end| end <= side);
+        (is_within(area.x, area.width, width) && is_within(area.y, area.height, height)).then_some(area)
+    }
+
+    /// Returns the size of pictures after the transform, from their `size` before.
+    ///
+    /// # Errors
+    /// The area is not within them; returns their size once they are rotated.
+    pub fn output_size(&self, size: (u32, u32)) -> Result<(u32, u32), (u32, u32)> {
+        self.area_in(size).map(|area| (area.width, area.height)).ok_or(self.rotated_size(size))
+    }
+
+    /// Writes the transformed picture to `into`, whose memory is reused. The area must be within the picture.
+    pub fn apply_to_color(&self, from: &ColorImage, into: &mut ColorImage) {
+        let Some(area) = self.area_in(from.size()) else { return };
+        into.resize(area.width, area.height);
+        self.transform(from.rgb.as_chunks::<3>().0, from.size(), area, into.rgb.as_chunks_mut::<3>().0);
+    }
+
+    /// Writes the transformed depth map of a picture of `picture_px` to `into`, whose memory is reused. The map may have
+    /// another resolution than the picture; it has no matte yet.
+    pub fn apply_to_map(&self, from: &DepthMap, picture_px: (u32, u32), into: &mut DepthMap) {
+        let area = self.area_on(from.size(), picture_px);
+        into.resize(area.width, area.height);
+        self.transform(&from.metres, from.size(), area, &mut into.metres);
+        into.matte.pixels.clear();
+        (into.subject_m, into.person_m, into.is_smooth) = (from.subject_m, from.person_m, from.is_smooth);
+    }
+
+    /// Returns the transformed depth map of a picture of `picture_px` ([`Transform::apply_to_map`]).
+    pub fn transform_map(&self, map: DepthMap, picture_px: (u32, u32)) -> DepthMap {
+        if self.is_identity() {
+            return map;
+        }
+        let mut into = DepthMap::default();
+        self.apply_to_map(&map, picture_px, &mut into);
+        into
+    }
+
+    /// Returns the transformed mask of a picture of `picture_px`; it may have another resolution than the picture.
+    pub fn apply_to_mask(&self, from: &Mask, picture_px: (u32, u32)) -> Mask {
+        let (size, mut into) = ((from.width, from.height), Mask::default());
+        let area = self.area_on(size, picture_px);
+        into.resize(area.width, area.height);
+        self.transform(&from.alpha, size, area, &mut into.alpha);
+        into
+    }
+
+    /// Returns where a point of a picture of `picture_px` is after the transform, both in fractions of width and height;
+    /// `None` outside of the area.
+    pub fn apply_to_point(&self, [x, y]: [f32; 2], picture_px: (u32, u32)) -> Option<[f32; 2]> {
+        let [x, y] = match self.rotation {
+            Rotation::None => [x, y],
+            Rotation::Quarter => [1.0 - y, x],
+            Rotation::Half => [1.0 - x, 1.0 - y],
+            Rotation::ThreeQuarters => [y, 1.0 - x],
+        };
+        let [x, y] = match self.flip {
+            Flip::None => [x, y],
+            Flip::Horizontal => [1.0 - x, y],
+            Flip::Vertical => [x, 1.0 - y],
+        };
+        let (area, (width, height)) = (self.area_in(picture_px)?, self.rotated_size(picture_px));
+        let point = [(x, width, area.x, area.width), (y, height, area.y, area.height)]
+            .map(|(at, side, begin, length)| (at * side as f32 - begin as f32) / length as f32);
+        point.iter().all(|at| (0.0..=1.0).contains(at)).then_some(point)
+    }
+
+    /// Returns the area on a rotated map of `size` that belongs to a picture of `picture_px`, to the nearest pixel.
+    fn area_on(&self, size: (u32, u32), picture_px: (u32, u32)) -> Area {
+        let ((width, height), (picture_width, picture_height)) =
+            (self.rotated_size(size), self.rotated_size(picture_px));
+        let Some(area) = self.area else { return Area { width, height, x: 0, y: 0 } };
+        let scaled = |begin: u32, length: u32, side: u32, picture_side: u32| {
+            let scale = |at: u32| (f64::from(at) * f64::from(side) / f64::from(picture_side.max(1))).round() as u32;
+            let begin = scale(begin).min(side.saturating_sub(1));
+            (begin, scale(length).clamp(1, side.saturating_sub(begin).max(1)))
+        };
+        let (x, width) = scaled(area.x, area.width, width, picture_width);
+        let (y, height) = scaled(area.y, area.height, height, picture_height);
+        Area { width, height, x, y }
+    }
+
+    /// Writes the `area` of the rotated samples to `into`, which has as many: one pass, in tiles where rows become columns.
+    fn transform<T: Copy>(&self, from: &[T], size: (u32, u32), area: Area, into: &mut [T]) {
+        let (width, height) = (area.width as usize, area.height as usize);
+        if from.is_empty() || into.is_empty() {
+            return;
+        }
+        let (first, step_x, step_y) = self.steps(size, area);
+        let at = |x: usize, y: usize| (first + step_x * x as isize + step_y * y as isize) as usize;
+        match step_x {
+            1 => {
+                for (y, row) in into.chunks_exact_mut(width).enumerate() {
+                    let begin = at(0, y);
+                    row.copy_from_slice(&from[begin..begin + width]);
+                }
+            }
+            -1 => {
+                for (y, row) in into.chunks_exact_mut(width).enumerate() {
+                    let end = at(0, y) + 1;
+                    let reversed = from[end - width..end].iter().rev();
+                    row.iter_mut().zip(reversed).for_each(|(into, from)| *into = *from);
+                }
+            }
+            _ => {
+                for top in (0..height).step_by(TILE_PX) {
+                    for left in (0..width).step_by(TILE_PX) {
+                        let right = (left + TILE_PX).min(width);
+                        for y in top..(top + TILE_PX).min(height) {
+                            let row = &mut into[y * width + left..y * width + right];
+                            row.iter_mut().enumerate().for_each(|(x, into)| *into = from[at(left + x, y)]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns the index of the area's first sample in a plane of `size`, and the steps to the next column and row.
+    fn steps(&self, size: (u32, u32), area: Area) -> (isize, isize, isize) {
+        let (width, height) = (size.0 as isize, size.1 as isize);
+        let index = |x: isize, y: isize| {
+            let (x, y) = (x + area.x as isize, y + area.y as isize);
+            let (rotated_width, rotated_height) = self.rotated_size(size);
+            let (x, y) = match self.flip {
+                Flip::None => (x, y),
+                Flip::Horizontal => (rotated_width as isize - 1 - x, y),
+                Flip::Vertical => (x, rotated_height as isize - 1 - y),
+            };
+            let (x, y) = match self.rotation {
+                Rotation::None => (x, y),
+                Rotation::Quarter => (y, height - 1 - x),
+                Rotation::Half => (width - 1 - x, height - 1 - y),
+                Rotation::ThreeQuarters => (width - 1 - y, x),
+            };
+            y * width + x
+        };
+        let first = index(0, 0);
+        (first, index(1, 0) - first, index(0, 1) - first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three columns and two rows, numbered in reading order.
+    fn numbered() -> DepthMap {
+        DepthMap { width: 3, height: 2, metres: (1..=6).map(|k| k as f32).collect(), ..DepthMap::default() }
+    }
+
+    fn transformed(transform: Transform) -> (u32, Vec<f32>) {
+        let (from, mut into) = (numbered(), DepthMap::default());
+        transform.apply_to_map(&from, from.size(), &mut into);
+        (into.width, into.metres)
+    }
+
+    const ALL: [(Rotation, Flip); 12] = {
+        let mut all = [(Rotation::None, Flip::None); 12];
+        let mut k = 0;
+        while k < 12 {
+            all[k] = (Rotation::ALL[k / 3], Flip::ALL[k % 3]);
+            k += 1;
+        }
+        all
+    };
+
+    #[test]
+    fn pictures_are_rotated_clockwise_then_flipped_then_cut() {
+        let case = |rotation, flip, area: &str| {
+            transformed(Transform { rotation, flip, area: (!area.is_empty()).then(|| area.parse().unwrap()) })
+        };
+        assert_eq!(case(Rotation::None, Flip::None, ""), (3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+        assert_eq!(case(Rotation::Quarter, Flip::None, ""), (2, vec![4.0, 1.0, 5.0, 2.0, 6.0, 3.0]));
+        assert_eq!(case(Rotation::Half, Flip::None, ""), (3, vec![6.0, 5.0, 4.0, 3.0, 2.0, 1.0]));
+        assert_eq!(case(Rotation::ThreeQuarters, Flip::None, ""), (2, vec![3.0, 6.0, 2.0, 5.0, 1.0, 4.0]));
+        assert_eq!(case(Rotation::None, Flip::Horizontal, ""), (3, vec![3.0, 2.0, 1.0, 6.0, 5.0, 4.0]));
+        assert_eq!(case(Rotation::None, Flip::Vertical, ""), (3, vec![4.0, 5.0, 6.0, 1.0, 2.0, 3.0]));
+        assert_eq!(case(Rotation::Quarter, Flip::Horizontal, ""), (2, vec![1.0, 4.0, 2.0, 5.0, 3.0, 6.0]));
+        assert_eq!(case(Rotation::Quarter, Flip::None, "1x2+1+1"), (1, vec![2.0, 3.0]));
+        assert_eq!(case(Rotation::Half, Flip::Vertical, "2x1+1+0"), (2, vec![2.0, 1.0]));
+    }
+
+    #[test]
+    fn a_picture_and_its_map_stay_together_at_every_size() {
+        for (rotation, flip) in ALL {
+            // Larger than a tile, and no multiple of one.
+            let mut from = ColorImage::new(70, 41);
+            for (at, pixel) in from.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                *pixel = [(at % 70) as u8, (at / 70) as u8, 7];
+            }
+            let metres = from.rgb.as_chunks::<3>().0.iter().map(|[x, y, _]| f32::from(*y) * 70.0 + f32::from(*x));
+            let map = DepthMap { width: 70, height: 41, metres: metres.collect(), ..DepthMap::default() };
+            let transform = Transform { rotation, flip, area: Some("33x20+2+9".parse().unwrap()) };
+            let (mut color, mut turned) = (ColorImage::default(), DepthMap::default());
+            transform.apply_to_color(&from, &mut color);
+            transform.apply_to_map(&map, from.size(), &mut turned);
+            assert_eq!((color.size(), turned.size()), ((33, 20), (33, 20)));
+            for (pixel, metres) in color.rgb.as_chunks::<3>().0.iter().zip(&turned.metres) {
+                assert_eq!(f32::from(pixel[1]) * 70.0 + f32::from(pixel[0]), *metres, "{rotation:?} {flip:?}");
+            }
+            // The centre of a pixel is where the pixel is.
+            let (x, y) = (30.0, 20.0);
+            let point = transform.apply_to_point([(x + 0.5) / 70.0, (y + 0.5) / 41.0], (70, 41));
+            if let Some([px, py]) = point {
+                let at = (py * 20.0) as usize * 33 + (px * 33.0) as usize;
+                assert_eq!(turned.metres[at], y * 70.0 + x, "{rotation:?} {flip:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_coarser_map_is_cut_where_the_picture_is() {
+        let map = DepthMap { width: 8, height: 4, metres: (0..32).map(|k| k as f32).collect(), ..DepthMap::default() };
+        let transform = Transform { area: Some("40x20+20+10".parse().unwrap()), ..Transform::default() };
+        let mut into = DepthMap::default();
+        transform.apply_to_map(&map, (80, 40), &mut into);
+        assert_eq!((into.size(), &into.metres[..]), ((4, 2), &[10.0, 11.0, 12.0, 13.0, 18.0, 19.0, 20.0, 21.0][..]));
+        let mask = Mask { width: 2, height: 2, alpha: vec![0.0, 0.25, 0.5, 1.0] };
+        let cut = Transform { area: Some("1x1+79+39".parse().unwrap()), ..Transform::default() };
+        assert_eq!(cut.apply_to_mask(&mask, (80, 40)), Mask { width: 1, height: 1, alpha: vec![1.0] });
+    }
+
+    #[test]
+    fn an_area_outside_is_refused_with_the_size_of_the_turned_picture() {
+        let size = |rotation, area: &str| {
+            Transform { rotation, area: Some(area.parse().unwrap()), ..Transform::default() }.output_size((640, 480))
+        };
+        assert_eq!(size(Rotation::None, "640x480+0+0"), Ok((640, 480)));
+        assert_eq!(size(Rotation::Quarter, "480x640+0+0"), Ok((480, 640)));
+        assert_eq!(size(Rotation::Quarter, "640x480+0+0"), Err((480, 640)));
+        for area in ["641x1+0+0", "1x1+640+0", "1x1+0+480", "2x2+4294967295+0", "4294967295x1+1+0"] {
+            assert_eq!(size(Rotation::Half, area), Err((640, 480)), "{area}");
+        }
+    }
+
+    #[test]
+    fn areas_are_read_as_they_are_printed() {
+        assert_eq!("1280x720+320+0".parse::<Area>().unwrap().to_string(), "1280x720+320+0");
+        for text in ["", "640x480", "640x480+1", "0x1+0+0", "1x0+0+0", "-1x1+0+0", "1x1+-1+0", "1x1++1+0", "1x1+1+0+0"]
+        {
+            assert!(text.parse::<Area>().unwrap_err().contains("1280x720+320+180"), "{text}");
+        }
+    }
+}
