@@ -23,7 +23,7 @@ const LAYERS: [&[&str]; 13] = [
 ];
 
 /// External crates, and the only places that may name them: modules of the library, or folders of a crate above it.
-const DOORS: [(&str, &[&str]); 32] = [
+const DOORS: [(&str, &[&str]); 34] = [
     ("bokehcam_link", &["lib"]),
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
@@ -34,8 +34,10 @@ const DOORS: [(&str, &[&str]); 32] = [
     ("egui_wgpu", &["window/present"]),
     ("egui_winit", &["window/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
+    ("image_webp", &["recording/encode"]),
     ("indicatif", &["cli"]),
     ("jiff", &["files/user_folders"]),
+    ("moxcms", &["recording/icc"]),
     ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
     ("plotters", &["lab"]),
