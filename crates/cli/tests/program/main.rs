@@ -14,6 +14,7 @@ mod store;
 
 mod batch;
 mod cli;
+mod colors;
 mod ctl;
 #[cfg(feature = "lab")]
 mod debug_dir;

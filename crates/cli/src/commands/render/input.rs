@@ -13,14 +13,13 @@ use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
-use bokehcam::recording::{PhotoMetadata, snapshot, still};
+use bokehcam::recording::{Photo, snapshot, still};
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
 
 /// Input of the blur.
 pub(super) struct Input {
-    pub color: ColorImage,
-    pub metadata: PhotoMetadata,
+    pub photo: Photo,
     pub depth: Option<Depth>,
     /// The origin of the depth.
     pub depth_from: DepthOrigin,
@@ -50,17 +49,18 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         // clap requires an image without `--like`.
         (image, _) => (image.clone().unwrap_or_default(), None),
     };
-    let (color, metadata) = still::read_photo(&image)?;
-    let mut input = Input { color, metadata, depth: None, depth_from: DepthOrigin::Nothing, found: None };
-    if let Some(made) = compute_depth(command, look, &input.color)? {
+    let photo = Photo::read(&image)?;
+    photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
+    let mut input = Input { photo, depth: None, depth_from: DepthOrigin::Nothing, found: None };
+    if let Some(made) = compute_depth(command, look, &input.photo.color)? {
         // Masks and networks have their own scale.
         (input.depth, input.depth_from) = (Some(made), DepthOrigin::Metres);
     } else if let Some(file) = &command.depth_map {
-        let (mut map, from) = read_depth(file, command, look, &input.color)?;
-        source::find_person(&command.source_options(), look, &input.color, &mut map);
+        let (mut map, from) = read_depth(file, command, look, &input.photo.color)?;
+        source::find_person(&command.source_options(), look, &input.photo.color, &mut map);
         (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
     } else if let Some(file) = kept_depth {
-        let (map, from) = read_depth(&file, command, look, &input.color)?;
+        let (map, from) = read_depth(&file, command, look, &input.photo.color)?;
         (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
     } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
         find_depth(&image, command, look, &mut input)?;
@@ -70,14 +70,14 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
 
 /// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
 fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
-    let (found, notes) = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
+    let (found, notes) = photo::read_default_depth(image, &input.photo.color, &command.source_options(), look)?;
     notes.iter().for_each(|note| log::note(note));
     let Some(PhotoDepth { map, from, measured, by, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {
         plausible::warn_of_subject(None, &map, None);
     }
     input.found = Some(FoundDepth { measured, by, focus });
-    input.color = original.unwrap_or_else(|| std::mem::take(&mut input.color));
+    original.into_iter().for_each(|original| input.photo.replace_by_original(original));
     input.depth_from = from;
     input.depth = Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) });
     Ok(())
