@@ -1,4 +1,10 @@
-//! Colour: sRGB transfer function, luminance, and luma weights.
+//! Colour: tone curves, above all sRGB's transfer function; luminance, and luma weights.
+
+mod picture16;
+mod tone_curve;
+
+pub use picture16::Picture16;
+pub use tone_curve::{ToneCurve, ToneCurves};
 
 /// Converts an sRGB code value in [0, 1] to linear light (IEC 61966-2-1).
 pub fn srgb_to_linear(code: f32) -> f32 {
@@ -18,6 +24,12 @@ pub fn linear_to_srgb(light: f32) -> f32 {
 /// Converts linear light, 1 = white, to 8-bit sRGB; clamps to 0..1 first.
 pub fn encode_srgb(light: f32) -> u8 {
     (linear_to_srgb(light.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
+}
+
+/// Rounds a 16-bit code to 8 bits.
+#[inline(always)]
+pub fn round_to_8bit(code: u16) -> u8 {
+    ((u32::from(code) * 255 + 32767) / 65535) as u8
 }
 
 /// Returns the luminance of linear light (Rec. 709 weights).

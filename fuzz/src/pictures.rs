@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::recording::depth_file::{self, DepthUnit, Fit, Options};
-use bokehcam::recording::{PhotoMetadata, embedded, snapshot as snapshots, still};
+use bokehcam::recording::{Photo, PhotoMetadata, embedded, snapshot as snapshots, still};
 
 use super::input::{assert_one_line, file_path, write_file};
 
@@ -20,6 +20,7 @@ pub fn picture(data: &[u8]) {
             assert_eq!(image.rgb.len(), image.width as usize * image.height as usize * 3);
             if image.rgb.len() < MAX_WRITTEN_BYTES {
                 check_roundtrip(&image, metadata);
+                check_photo(&path);
             }
         }
         Err(error) => assert_one_line(error),
@@ -34,6 +35,20 @@ pub fn picture(data: &[u8]) {
     }
     if let Err(error) = snapshots::read_settings(&path) {
         assert_one_line(error);
+    }
+}
+
+/// Checks that a photo is written as TIFF and WebP as it was read.
+fn check_photo(path: &Path) {
+    for name in ["photo.tif", "photo.webp"] {
+        let (photo, to) = (Photo::read(path).expect("a photo that was read before"), file_path(name));
+        let (size, is_16bit, alpha) = (photo.color.size(), photo.is_16bit, photo.alpha.clone());
+        photo.write(&to, true).expect("a photo that was read can be written");
+        let again = Photo::read(&to).expect("a photo that was written can be read");
+        assert_eq!(again.color.size(), size, "{name}");
+        if name == "photo.tif" {
+            assert_eq!((again.is_16bit, again.alpha), (is_16bit, alpha));
+        }
     }
 }
 

@@ -38,8 +38,8 @@ impl SliceBlur {
         self.size
     }
 
-    /// Blurs a picture into `out`. Both have `height * width * 3` samples, 8-bit sRGB or linear light ([`Pixels`]).
-    /// Highlights are recovered in 8-bit pictures only. [`Radii::Each`] needs settings whose
+    /// Blurs a picture into `out`. Both have `height * width * 3` samples, 8-bit or 16-bit sRGB, or linear light
+    /// ([`Pixels`]), in which highlights are not recovered. [`Radii::Each`] needs settings whose
     /// [`CocKind`](crate::optics::CocKind) is `Depth`. Calls `check_stop` after each pass, a few times per picture; on
     /// `Break` it stops, and `out` is unspecified.
     ///

@@ -2,9 +2,12 @@
 
 use super::frame_processor::reject_transparency;
 use super::{Blur, Images, Input, Kept, Origin, Playback, Preprocessor};
-use crate::bokeh::BokehError;
+use crate::bokeh::cpu::CpuBokeh;
+use crate::bokeh::plan::Plan;
+use crate::bokeh::{Bokeh, BokehError};
+use crate::color::Picture16;
 use crate::computing::ComputeOptions;
-use crate::depth::backdrop::CutOut;
+use crate::depth::backdrop::{Background, CutOut};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::look::Look;
@@ -109,4 +112,44 @@ pub fn render_picture(
     };
     let [_, by] = blur.describe_executor();
     Ok(Rendered { color, alpha, by })
+}
+
+/// Does the same as [`blur_picture`] for 16-bit codes, always on the CPU, in linear light of their tone curves. `color`
+/// shows the same light as 8-bit sRGB ([`Picture16::to_srgb`]); depth is processed with it.
+///
+/// # Errors
+/// The blur follows depth and none is given, or it is too wide for the picture.
+pub fn blur_picture_16bit(
+    look: &Look,
+    mut color: ColorImage,
+    mut picture: Picture16,
+    depth: Option<Depth>,
+    threads: Option<usize>,
+) -> Result<(Picture16, String), BokehError> {
+    let size = color.size();
+    let Some(settings) = look.blur_settings(size, false) else { return Ok((picture, "not blurred".to_string())) };
+    settings.check(size)?;
+    let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), threads);
+    let (coc, depth) = prepare_16bit(look, &mut color, &mut picture, depth)?;
+    drop(color);
+    let blurred = cpu.blur_16bit(&picture, depth.as_ref(), &coc)?;
+    Ok((blurred, format!("{}, 16 bits", cpu.describe())))
+}
+
+/// Does the same as [`compute_coc_and_depth`] for 16-bit codes, of which `color` shows the light as 8-bit sRGB.
+///
+/// # Errors
+/// The same as for [`compute_coc_and_depth`].
+pub fn prepare_16bit(
+    look: &Look,
+    color: &mut ColorImage,
+    picture: &mut Picture16,
+    depth: Option<Depth>,
+) -> Result<(CocField, Option<DepthMap>), BokehError> {
+    let before = (look.background != Background::Blur).then(|| color.clone());
+    let prepared = compute_coc_and_depth(look, color, depth)?;
+    if let Some(before) = before {
+        picture.take_changes(&before.rgb, &color.rgb);
+    }
+    Ok(prepared)
 }

@@ -79,7 +79,7 @@ pub struct Transform {
 }
 
 /// Side of the square tiles in which rows become columns, in pixels: source and destination stay in the cache.
-const TILE_PX: usize = 32;
+const TILE_PX: usize = 64;
 
 impl Transform {
     /// Returns whether pictures stay as they are.
@@ -116,6 +116,14 @@ impl Transform {
         let Some(area) = self.area_in(from.size()) else { return };
         into.resize(area.width, area.height);
         self.transform(from.rgb.as_chunks::<3>().0, from.size(), area, into.rgb.as_chunks_mut::<3>().0);
+    }
+
+    /// Returns the transformed pixels of a picture of `size`. The area must be within the picture.
+    pub fn apply_to_pixels<T: Copy + Default>(&self, from: &[T], size: (u32, u32)) -> Vec<T> {
+        let Some(area) = self.area_in(size) else { return Vec::new() };
+        let mut into = vec![T::default(); area.width as usize * area.height as usize];
+        self.transform(from, size, area, &mut into);
+        into
     }
 
     /// Writes the transformed depth map of a picture of `picture_px` to `into`, whose memory is reused. The map may have
@@ -287,26 +295,26 @@ mod tests {
     fn a_picture_and_its_map_stay_together_at_every_size() {
         for (rotation, flip) in ALL {
             // Larger than a tile, and no multiple of one.
-            let mut from = ColorImage::new(70, 41);
+            let mut from = ColorImage::new(170, 141);
             for (at, pixel) in from.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                *pixel = [(at % 70) as u8, (at / 70) as u8, 7];
+                *pixel = [(at % 170) as u8, (at / 170) as u8, 7];
             }
-            let metres = from.rgb.as_chunks::<3>().0.iter().map(|[x, y, _]| f32::from(*y) * 70.0 + f32::from(*x));
-            let map = DepthMap { width: 70, height: 41, metres: metres.collect(), ..DepthMap::default() };
-            let transform = Transform { rotation, flip, area: Some("33x20+2+9".parse().unwrap()) };
+            let metres = from.rgb.as_chunks::<3>().0.iter().map(|[x, y, _]| f32::from(*y) * 170.0 + f32::from(*x));
+            let map = DepthMap { width: 170, height: 141, metres: metres.collect(), ..DepthMap::default() };
+            let transform = Transform { rotation, flip, area: Some("130x100+2+9".parse().unwrap()) };
             let (mut color, mut turned) = (ColorImage::default(), DepthMap::default());
             transform.apply_to_color(&from, &mut color);
             transform.apply_to_map(&map, from.size(), &mut turned);
-            assert_eq!((color.size(), turned.size()), ((33, 20), (33, 20)));
+            assert_eq!((color.size(), turned.size()), ((130, 100), (130, 100)));
             for (pixel, metres) in color.rgb.as_chunks::<3>().0.iter().zip(&turned.metres) {
-                assert_eq!(f32::from(pixel[1]) * 70.0 + f32::from(pixel[0]), *metres, "{rotation:?} {flip:?}");
+                assert_eq!(f32::from(pixel[1]) * 170.0 + f32::from(pixel[0]), *metres, "{rotation:?} {flip:?}");
             }
             // The centre of a pixel is where the pixel is.
             let (x, y) = (30.0, 20.0);
-            let point = transform.apply_to_point([(x + 0.5) / 70.0, (y + 0.5) / 41.0], (70, 41));
+            let point = transform.apply_to_point([(x + 0.5) / 170.0, (y + 0.5) / 141.0], (170, 141));
             if let Some([px, py]) = point {
-                let at = (py * 20.0) as usize * 33 + (px * 33.0) as usize;
-                assert_eq!(turned.metres[at], y * 70.0 + x, "{rotation:?} {flip:?}");
+                let at = (py * 100.0) as usize * 130 + (px * 130.0) as usize;
+                assert_eq!(turned.metres[at], y * 170.0 + x, "{rotation:?} {flip:?}");
             }
         }
     }

@@ -20,6 +20,7 @@ use super::photo_metadata::PhotoMetadata;
 use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
 use super::tiff_directory::is_raw_tiff;
+use super::tiff_file::{TiffPhotoDecoder, Undecoded};
 use crate::files::input;
 
 /// What a message names where no picture is found.
@@ -95,6 +96,14 @@ impl<'a> EncodedPicture<'a> {
         match self {
             Self::Png(reader) => PhotoMetadata::from_png(reader.info()),
             Self::Whole(mut decoder) => PhotoMetadata::from_decoder(&mut *decoder),
+        }
+    }
+
+    /// Returns the colour profile, before the pixels.
+    pub(super) fn icc_profile(&mut self) -> Option<Vec<u8>> {
+        match self {
+            Self::Png(reader) => reader.info().icc_profile.as_deref().map(<[u8]>::to_vec),
+            Self::Whole(decoder) => decoder.icc_profile().ok().flatten(),
         }
     }
 
@@ -243,10 +252,16 @@ fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> 
 
 /// Creates a decoder of 8 or 16 bits for a file, whose size is checked.
 fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDecoder>, PictureFault> {
-    if format == ImageFormat::Tiff && is_raw_tiff(&mut file)? {
+    if format != ImageFormat::Tiff {
+        return decode_with(BufReader::new(file), format);
+    }
+    if is_raw_tiff(&mut file)? {
         return Err(FileKind::fault(Some(file_kind::RAW), PICTURES));
     }
-    decode_with(BufReader::new(file), format)
+    let undecoded = Undecoded::read(&mut file);
+    file.rewind()?;
+    let decoder = decode_with(BufReader::new(file), format)?;
+    Ok(Box::new(TiffPhotoDecoder { decoder, undecoded }))
 }
 
 /// Creates a decoder of 8 or 16 bits, whose size is checked.

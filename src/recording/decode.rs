@@ -7,9 +7,9 @@ use pulp::{Arch, WithSimd};
 use super::coded::{self, EncodedPicture};
 use super::depth_covers;
 use super::fault::PictureFault;
-use super::photo_metadata::PhotoMetadata;
+use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
 use super::samples::SampleFormat;
-use crate::color::luminance;
+use crate::color::{luminance, round_to_8bit};
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// Working memory for decoding, kept from frame to frame.
@@ -93,19 +93,22 @@ pub(super) fn decode_color(
         return coded.decode_rgb(pixels, &mut into.rgb);
     }
     let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-    coded.decode_runs(pixels, |run, row| {
+    let mut metadata = coded.decode_runs(pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             *rgb = channels.map(|channel| match samples.is_16bit {
-                true => ((u32::from(sample_u16(pixel, channel)) * 255 + 32767) / 65535) as u8,
+                true => round_to_8bit(sample_u16(pixel, channel)),
                 false => pixel[channel],
             });
         }
-    })
+    })?;
+    let lost = [(samples.has_alpha(), TRANSPARENCY), (samples.is_16bit, SIXTEEN_BITS)];
+    metadata.lost_properties.extend(lost.iter().filter(|(is_lost, _)| *is_lost).map(|(_, words)| words));
+    Ok(metadata)
 }
 
 /// Returns the 16-bit sample of a channel.
-fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
+pub(super) fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
     u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])
 }
 

@@ -1,4 +1,4 @@
-//! Encodes pixels as PNG and JPEG.
+//! Encodes pixels as PNG, JPEG and WebP.
 
 use std::borrow::Cow;
 
@@ -9,6 +9,7 @@ use png::text_metadata::ITXtChunk;
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{self, DISPARITY_SCALE, MapUnit};
 use super::{jpeg, xmp};
+use crate::color::round_to_8bit;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// High enough that compression artefacts stay invisible.
@@ -17,41 +18,94 @@ const JPEG_QUALITY: u8 = 95;
 /// Compresses as well as a filter chosen per row, in half the time (measured on 640x480 colour and depth).
 const PNG_FILTER: png::Filter = png::Filter::Paeth;
 
-/// Appends `image` to `file` as PNG, with a fast compression that keeps up with a camera.
-pub(super) fn encode_color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
-    encode_photo_png((image, None), &PhotoMetadata::default(), file)
+/// Pixels to encode: RGB, or RGBA with straight alpha.
+pub(super) struct Raster<'a> {
+    pub(super) size: (u32, u32),
+    pub(super) samples: Samples<'a>,
+    pub(super) has_alpha: bool,
 }
 
-/// Appends `image` to `file` as PNG, with its alpha channel if there is one (a byte per pixel), colour profile, EXIF and
-/// XMP.
+/// Interleaved samples.
+pub(super) enum Samples<'a> {
+    Bits8(Cow<'a, [u8]>),
+    Bits16(Vec<u16>),
+}
+
+impl<'a> From<&'a ColorImage> for Raster<'a> {
+    fn from(image: &'a ColorImage) -> Self {
+        Self { size: image.size(), samples: Samples::Bits8(Cow::Borrowed(&image.rgb)), has_alpha: false }
+    }
+}
+
+impl Raster<'static> {
+    /// Joins 8-bit RGB, and alpha of every pixel (65535 is opaque).
+    pub(super) fn from_8bit(size: (u32, u32), rgb: Vec<u8>, alpha: Option<&[u16]>) -> Self {
+        let samples = match alpha {
+            None => rgb,
+            Some(alpha) => {
+                let pixels = rgb.as_chunks().0.iter().zip(alpha);
+                pixels.flat_map(|(&[r, g, b], &alpha)| [r, g, b, round_to_8bit(alpha)]).collect()
+            }
+        };
+        Self { size, samples: Samples::Bits8(Cow::Owned(samples)), has_alpha: alpha.is_some() }
+    }
+
+    /// Joins 16-bit RGB, and alpha of every pixel.
+    pub(super) fn from_16bit(size: (u32, u32), rgb: Vec<u16>, alpha: Option<&[u16]>) -> Self {
+        let samples = match alpha {
+            None => rgb,
+            Some(alpha) => {
+                rgb.as_chunks().0.iter().zip(alpha).flat_map(|(&[r, g, b], &alpha)| [r, g, b, alpha]).collect()
+            }
+        };
+        Self { size, samples: Samples::Bits16(samples), has_alpha: alpha.is_some() }
+    }
+}
+
+impl Raster<'_> {
+    /// Returns samples of 8 bits and their format.
+    fn to_8bit(&self) -> (Cow<'_, [u8]>, ExtendedColorType) {
+        let samples = match &self.samples {
+            Samples::Bits8(samples) => Cow::Borrowed(&**samples),
+            Samples::Bits16(samples) => samples.iter().map(|&code| round_to_8bit(code)).collect(),
+        };
+        (samples, if self.has_alpha { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 })
+    }
+}
+
+/// Appends `image` to `file` as PNG, with a fast compression that keeps up with a camera.
+pub(super) fn encode_color_png(image: &ColorImage, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
+    encode_photo_png(&image.into(), &PhotoMetadata::default(), file)
+}
+
+/// Appends a picture to `file` as PNG, with its colour profile, EXIF and XMP.
 pub(super) fn encode_photo_png(
-    (image, alpha): (&ColorImage, Option<&[u8]>),
+    raster: &Raster,
     metadata: &PhotoMetadata,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
-    let mut info = png::Info::with_size(image.width, image.height);
+    let mut info = png::Info::with_size(raster.size.0, raster.size.1);
     info.icc_profile = metadata.icc_profile.as_deref().map(Cow::Borrowed);
     info.exif_metadata = metadata.exif.as_deref().map(Cow::Borrowed);
     info.utf8_text.extend(metadata.xmp.as_ref().map(|packet| ITXtChunk::new(xmp::PNG_KEYWORD, packet)));
     let mut encoder = png::Encoder::with_info(file, info)?;
-    encoder.set_color(if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb });
-    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_color(if raster.has_alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
+    let (depth, bytes) = match &raster.samples {
+        Samples::Bits8(samples) => (png::BitDepth::Eight, Cow::Borrowed(&**samples)),
+        Samples::Bits16(samples) => {
+            (png::BitDepth::Sixteen, samples.iter().flat_map(|code| code.to_be_bytes()).collect())
+        }
+    };
+    encoder.set_depth(depth);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(PNG_FILTER);
     let mut writer = encoder.write_header()?;
-    match alpha {
-        None => writer.write_image_data(&image.rgb)?,
-        Some(alpha) => {
-            let pixels = image.rgb.as_chunks::<3>().0.iter().zip(alpha);
-            let rgba: Vec<u8> = pixels.flat_map(|(&[r, g, b], &alpha)| [r, g, b, alpha]).collect();
-            writer.write_image_data(&rgba)?;
-        }
-    }
+    writer.write_image_data(&bytes)?;
     writer.finish()
 }
 
-/// Appends `image` to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP.
-pub(super) fn encode_photo_jpeg(image: &ColorImage, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
+/// Appends a picture to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP. It has no alpha.
+pub(super) fn encode_photo_jpeg(raster: &Raster, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
     let mut encoder = JpegEncoder::new_with_quality(&mut *file, JPEG_QUALITY);
     if let Some(profile) = &metadata.icc_profile {
         encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
@@ -59,11 +113,26 @@ pub(super) fn encode_photo_jpeg(image: &ColorImage, metadata: &PhotoMetadata, fi
     if let Some(exif) = &metadata.exif {
         encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
     }
-    encoder.write_image(&image.rgb, image.width, image.height, ExtendedColorType::Rgb8)?;
+    let (samples, color) = raster.to_8bit();
+    encoder.write_image(&samples, raster.size.0, raster.size.1, color)?;
     if let Some(packet) = &metadata.xmp {
         jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }
     Ok(())
+}
+
+/// Appends a picture to `file` as lossless WebP of 8 bits, with its colour profile, EXIF and XMP.
+pub(super) fn encode_photo_webp(
+    raster: &Raster,
+    metadata: &PhotoMetadata,
+    file: &mut Vec<u8>,
+) -> Result<(), image_webp::EncodingError> {
+    let mut encoder = image_webp::WebPEncoder::new(file);
+    metadata.icc_profile.iter().for_each(|profile| encoder.set_icc_profile(profile.clone()));
+    metadata.exif.iter().for_each(|exif| encoder.set_exif_metadata(exif.clone()));
+    metadata.xmp.iter().for_each(|packet| encoder.set_xmp_metadata(packet.clone().into_bytes()));
+    let color = if raster.has_alpha { image_webp::ColorType::Rgba8 } else { image_webp::ColorType::Rgb8 };
+    encoder.encode(&raster.to_8bit().0, raster.size.0, raster.size.1, color)
 }
 
 /// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre, with `meaning` as a text chunk if

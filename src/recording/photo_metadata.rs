@@ -3,7 +3,8 @@
 use image::ImageDecoder;
 use image::metadata::Orientation;
 
-use super::xmp;
+use super::still::PhotoFormat;
+use super::{icc, xmp};
 
 /// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -14,9 +15,13 @@ pub struct PhotoMetadata {
     pub exif: Option<Vec<u8>>,
     /// XMP packet, with rights and authors.
     pub xmp: Option<String>,
-    /// What 8-bit RGB cannot hold, in words for a message.
+    /// What is lost on reading or writing, in words for a message.
     pub lost_properties: Vec<&'static str>,
 }
+
+/// What 8-bit pictures without alpha lose, in words for a message.
+pub(super) const TRANSPARENCY: &str = "transparency";
+pub(super) const SIXTEEN_BITS: &str = "16 bits a channel";
 
 /// Maximum EXIF bytes in a JPEG: a segment has 65533, six of which are its identifier.
 const MAX_JPEG_EXIF_BYTES: usize = 65_533 - 6;
@@ -35,14 +40,6 @@ impl PhotoMetadata {
             let packet = chunk.decompress_text_with_limit(xmp::MAX_BYTES).and_then(|()| chunk.get_text());
             metadata.set_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
         }
-        // Transparency is either a channel (2 or 4 samples) or a tRNS chunk.
-        let alpha_is_in_trns = info.color_type == png::ColorType::Indexed || info.trns.is_some();
-        if info.trns.is_some() || (!alpha_is_in_trns && info.color_type.samples().is_multiple_of(2)) {
-            metadata.lost_properties.push("transparency");
-        }
-        if info.bit_depth == png::BitDepth::Sixteen {
-            metadata.lost_properties.push("16 bits a channel");
-        }
         metadata
     }
 
@@ -53,14 +50,7 @@ impl PhotoMetadata {
         // A TIFF states its orientation by itself.
         let orientation = decoder.orientation().ok().filter(|turned| *turned != Orientation::NoTransforms);
         let exif = exif.or_else(|| orientation.map(exif_of_orientation));
-        let color = decoder.original_color_type();
         let mut metadata = Self { exif, ..Self::default() };
-        if decoder.color_type().has_alpha() {
-            metadata.lost_properties.push("transparency");
-        }
-        if color.bits_per_pixel() / u16::from(color.channel_count()) > 8 {
-            metadata.lost_properties.push("16 bits a channel");
-        }
         metadata.set_profile(decoder.icc_profile().ok().flatten());
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
             metadata.set_xmp(Ok(packet));
@@ -70,11 +60,9 @@ impl PhotoMetadata {
 
     /// Keeps a profile only if it is for RGB: the pixels become RGB, so a grey or CMYK profile no longer applies.
     fn set_profile(&mut self, profile: Option<Vec<u8>>) {
-        /// Position of the colour space in an ICC profile.
-        const SPACE: std::ops::Range<usize> = 16..20;
         match profile {
-            Some(profile) if profile.get(SPACE) != Some(b"RGB ") => {
-                self.lost_properties.push("a colour profile that is not of RGB");
+            Some(profile) if !icc::is_rgb(&profile) => {
+                self.lost_properties.push("a colour profile that is not of RGB (the blur uses sRGB's tone curve)");
             }
             profile => self.icc_profile = profile,
         }
@@ -106,6 +94,15 @@ impl PhotoMetadata {
             }
         }
         self
+    }
+
+    /// Drops metadata that a format does not hold.
+    #[must_use]
+    pub fn for_format(self, format: PhotoFormat) -> Self {
+        match format {
+            PhotoFormat::Jpeg => self.for_jpeg(),
+            PhotoFormat::Png | PhotoFormat::Tiff | PhotoFormat::WebP => self,
+        }
     }
 
     /// Drops metadata that is too large for a JPEG.

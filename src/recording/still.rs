@@ -12,12 +12,13 @@ use image::{DynamicImage, ImageFormat, RgbImage};
 use super::coded::EncodedPicture;
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
+use super::encode::Raster;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
-use super::{check_depth_scale, coded, depth_covers, encode, pfm};
+use super::{check_depth_scale, coded, depth_covers, encode, pfm, tiff_file};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
@@ -140,7 +141,7 @@ pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError
     if is_dark { Err(RecordingError::picture(path)(PictureFault::Dark)) } else { Ok(picture) }
 }
 
-/// Writes a `.png`, `.jpg` or `.jpeg` file.
+/// Writes a `.png`, `.jpg`, `.jpeg`, `.tif`, `.tiff` or `.webp` file.
 ///
 /// # Errors
 /// The extension is another one; the file exists and `force` is not set; the file cannot be written.
@@ -158,26 +159,22 @@ pub fn write_photo(
     metadata: &PhotoMetadata,
     force: bool,
 ) -> Result<(), RecordingError> {
-    write_photo_with_alpha(path, (image, None), metadata, force)
+    write_raster(path, &Raster::from(image), metadata, force)
 }
 
-/// Does the same as [`write_photo`], with an alpha channel if there is one: a byte per pixel, 255 opaque.
-///
-/// # Errors
-/// Same as for [`write_color`]; or a JPEG would need an alpha channel.
-pub fn write_photo_with_alpha(
+/// Writes pixels in the format of the file name.
+pub(super) fn write_raster(
     path: &Path,
-    (image, alpha): (&ColorImage, Option<&[u8]>),
+    raster: &Raster,
     metadata: &PhotoMetadata,
     force: bool,
 ) -> Result<(), RecordingError> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
-        PhotoFormat::Png => {
-            encode::encode_photo_png((image, alpha), metadata, &mut file).map_err(|error| error.to_string())
-        }
-        PhotoFormat::Jpeg if alpha.is_some() => Err("JPEG keeps no transparency; use .png".to_owned()),
-        PhotoFormat::Jpeg => encode::encode_photo_jpeg(image, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Png => encode::encode_photo_png(raster, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Jpeg => encode::encode_photo_jpeg(raster, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::Tiff => tiff_file::encode_photo(raster, metadata, &mut file).map_err(|error| error.to_string()),
+        PhotoFormat::WebP => encode::encode_photo_webp(raster, metadata, &mut file).map_err(|error| error.to_string()),
     };
     write(path, encoded, &file, force)
 }
@@ -187,19 +184,25 @@ pub fn write_photo_with_alpha(
 pub enum PhotoFormat {
     /// Lossless.
     Png,
-    /// Lossy, and smaller.
+    /// Lossy, and smaller; 8 bits without alpha.
     Jpeg,
+    /// Lossless.
+    Tiff,
+    /// Lossless, and small; 8 bits.
+    WebP,
 }
 
 /// Returns the picture format for a file name.
 ///
 /// # Errors
-/// The extension is not `.png`, `.jpg` or `.jpeg`.
+/// The extension is not `.png`, `.jpg`, `.jpeg`, `.tif`, `.tiff` or `.webp`.
 pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
     match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
         Some("png") => Ok(PhotoFormat::Png),
         Some("jpg" | "jpeg") => Ok(PhotoFormat::Jpeg),
-        _ => Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.jpg`"))),
+        Some("tif" | "tiff") => Ok(PhotoFormat::Tiff),
+        Some("webp") => Ok(PhotoFormat::WebP),
+        _ => Err(RecordingError::picture(path)(PictureFault::Extension("`.png`, `.jpg`, `.tif` or `.webp`"))),
     }
 }
 

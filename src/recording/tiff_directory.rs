@@ -42,6 +42,21 @@ impl<'a> TiffDirectories<'a> {
         let entries = (0..usize::from(self.u16_at(directory)?)).map(|entry| directory + 2 + 12 * entry);
         entries.into_iter().find(|&at| self.u16_at(at) == Some(tag))
     }
+
+    /// Returns the entries of the directory at a position: tag, type, and values as stored. Those that lead outside of
+    /// the file are left out.
+    pub(super) fn entries(&self, directory: usize) -> impl Iterator<Item = (u16, u16, &'a [u8])> {
+        /// Bytes of a value, by its type.
+        const BYTES: [usize; 14] = [0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4];
+        let count = self.u16_at(directory).unwrap_or(0);
+        (0..usize::from(count)).filter_map(move |k| {
+            let at = directory + 2 + 12 * k;
+            let (tag, kind, count) = (self.u16_at(at)?, self.u16_at(at + 2)?, self.u32_at(at + 4)?);
+            let bytes = count.checked_mul(*BYTES.get(usize::from(kind))?)?;
+            let from = if bytes <= 4 { at + 8 } else { self.u32_at(at + 8)? };
+            Some((tag, kind, self.file.get(from..from.checked_add(bytes)?)?))
+        })
+    }
 }
 
 /// Returns whether a TIFF is the raw picture of a camera, whose first picture is only a small copy or is not developed.

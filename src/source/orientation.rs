@@ -9,6 +9,7 @@ use crate::depth::focus::FocusRule;
 use crate::depth::transformed::TransformedDepth;
 use crate::frame::transform::Transform;
 use crate::frame::{ColorImage, DepthMap};
+use crate::recording::Photo;
 
 /// The transform of a source's pictures, and their size before it.
 #[derive(Clone, Copy)]
@@ -69,20 +70,19 @@ impl SourceTransform {
     }
 }
 
-/// Returns a picture that was read from the file called `name`, turned, flipped and cut.
+/// Turns, flips and cuts a photo that was read from the file called `name`.
 ///
 /// # Errors
 /// The area to keep is not within the picture.
-pub fn transform_picture(options: Orientation, name: &str, color: ColorImage) -> Result<ColorImage, SourceError> {
+pub fn transform_photo(options: Orientation, name: &str, photo: &mut Photo) -> Result<(), SourceError> {
     let transform = options.transform();
     if transform.is_identity() {
-        return Ok(color);
+        return Ok(());
     }
     let outside = |size_px| CaptureError::AreaOutside { source_name: name.to_owned(), area: transform.area, size_px };
-    transform.output_size(color.size()).map_err(outside).map_err(to_usage)?;
-    let mut into = ColorImage::default();
-    transform.apply_to_color(&color, &mut into);
-    Ok(into)
+    transform.output_size(photo.color.size()).map_err(outside).map_err(to_usage)?;
+    photo.transform(&transform);
+    Ok(())
 }
 
 /// Another area would fit: the options are wrong, not the source.

@@ -23,7 +23,7 @@ const LAYERS: [&[&str]; 13] = [
 ];
 
 /// External crates, and the only places that may name them: modules of the library, or folders of a crate above it.
-const DOORS: [(&str, &[&str]); 35] = [
+const DOORS: [(&str, &[&str]); 37] = [
     ("bokehcam_link", &["lib"]),
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
@@ -34,10 +34,12 @@ const DOORS: [(&str, &[&str]); 35] = [
     ("egui_wgpu", &["window/present"]),
     ("egui_winit", &["window/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
+    ("image_webp", &["recording/encode"]),
     ("indicatif", &["cli"]),
     ("jiff", &["files/user_folders"]),
     ("lz4_flex", &["recording/mcap"]),
     ("lzfse_rust", &["recording/record3d"]),
+    ("moxcms", &["recording/icc"]),
     ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
     ("plotters", &["lab"]),
@@ -46,6 +48,7 @@ const DOORS: [(&str, &[&str]); 35] = [
         "rustix",
         &[
             "compute/memory",
+            "compute/thread_pool",
             "clock",
             "control",
             "files",

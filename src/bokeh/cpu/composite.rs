@@ -6,7 +6,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::encode::{CHUNK, EncodeTable};
+use super::encode::{CHUNK, Encoder};
 use super::held::HeldRow;
 use super::layers::Layers;
 use super::pixels::Sample;
@@ -34,8 +34,8 @@ pub struct Composite<'a, T> {
     pub pixels: &'a [T],
     /// Result of the gather, `[row][3][width]`.
     pub gathered: &'a [f32],
-    /// Table from linear light to 8 bits.
-    pub encode: &'a EncodeTable,
+    /// From linear light to codes.
+    pub encoder: &'a Encoder,
     pub y0: usize,
     /// Scratch memory of the thread.
     pub layers: &'a mut Layers,
@@ -90,7 +90,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
                 compress_highlights(&mut color.0, self.frame.expansion);
-                T::write(&color.0, self.encode, row);
+                T::write(&color.0, self.encoder, row);
             }
             self.hold(out, x0, take, still);
         }

@@ -1,10 +1,10 @@
-//! Conversion of linear light to 8-bit sRGB.
+//! Conversion of linear light to codes: 8-bit sRGB, or 16 bits with any tone curves.
 //!
 //! twin: shaders/composite.wgsl (`code_of`)
 
 #![allow(clippy::needless_range_loop)] // Columns index several arrays at once.
 
-use crate::color::encode_srgb;
+use crate::color::{ToneCurves, encode_srgb};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
@@ -15,6 +15,21 @@ const ENCODE_STEPS: usize = 1 << 12;
 const DARK: f32 = 1.0 / 16.0;
 /// Entries of the table: two halves of `ENCODE_STEPS + 1`, rounded up to a power of two so that an index is masked.
 const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
+
+/// Encodes linear light as codes.
+pub struct Encoder {
+    /// For 8-bit sRGB.
+    pub table: EncodeTable,
+    /// For 16-bit codes; `None` is sRGB.
+    pub curves: Option<ToneCurves>,
+}
+
+impl Encoder {
+    /// Returns the tone curves of 16-bit codes.
+    pub fn curves(&self) -> &ToneCurves {
+        self.curves.as_ref().unwrap_or_else(|| ToneCurves::srgb())
+    }
+}
 
 /// Table from linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then the whole range.
 pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);

@@ -1,10 +1,13 @@
 //! The `Bokeh` interface of the CPU executor: one frame in, one frame out.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::{CpuBokeh, Radii};
+use super::encode::{EncodeTable, Encoder};
+use super::{CpuBokeh, Radii, Sample};
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
+use crate::color::Picture16;
 use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -21,14 +24,40 @@ impl CpuBokeh {
         coc: &CocField,
         out: &mut ColorImage,
     ) -> Result<PassTimes, BokehError> {
-        let made_for = (self.plan.width as u32, self.plan.height as u32);
-        if color.size() != made_for {
-            return Err(BokehError::Size { made_for, got: color.size() });
-        }
-        if matches!(coc, CocField::Depth(_)) && depth.is_none() {
-            return Err(BokehError::NoDepth);
-        }
+        self.check_frame(color.size(), depth, coc)?;
         out.resize(color.width, color.height);
+        Ok(self.blur_timed(&color.rgb, Radii::Field(coc, depth), &mut out.rgb))
+    }
+
+    /// Blurs one picture of 16-bit codes in linear light of its tone curves.
+    ///
+    /// # Errors
+    /// The same as for [`CpuBokeh::blur`].
+    pub fn blur_16bit(
+        &mut self,
+        picture: &Picture16,
+        depth: Option<&DepthMap>,
+        coc: &CocField,
+    ) -> Result<Picture16, BokehError> {
+        self.check_frame(picture.size(), depth, coc)?;
+        self.encoder = Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) });
+        let mut out = Picture16::new(picture.size(), picture.curves.clone());
+        self.blur_timed(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb);
+        Ok(out)
+    }
+
+    fn check_frame(&self, got: (u32, u32), depth: Option<&DepthMap>, coc: &CocField) -> Result<(), BokehError> {
+        let made_for = (self.plan.width as u32, self.plan.height as u32);
+        if got != made_for {
+            return Err(BokehError::Size { made_for, got });
+        }
+        match (coc, depth) {
+            (CocField::Depth(_), None) => Err(BokehError::NoDepth),
+            _ => Ok(()),
+        }
+    }
+
+    fn blur_timed<T: Sample>(&mut self, pixels: &[T], coc: Radii<'_>, out: &mut [T]) -> PassTimes {
         let mut times = PassTimes::new();
         let mut clock = Instant::now();
         let lap = |name| {
@@ -37,8 +66,8 @@ impl CpuBokeh {
             clock = now;
             ControlFlow::Continue(())
         };
-        let _never_stopped = self.blur_pixels(&color.rgb, Radii::Field(coc, depth), &mut out.rgb, lap);
-        Ok(times)
+        let _never_stopped = self.blur_pixels(pixels, coc, out, lap);
+        times
     }
 }
 

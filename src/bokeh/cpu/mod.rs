@@ -28,10 +28,12 @@ mod tiles;
 mod unpack;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use band::{BandSums, NO_BIN};
 use blur::Scratch;
+use encode::{EncodeTable, Encoder};
 use gather::Gather;
 use held::Held;
 use pulp::Arch;
@@ -58,7 +60,7 @@ pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
     workers: ThreadPool,
-    encode: encode::EncodeTable,
+    encoder: Arc<Encoder>,
     tiles: Tiles,
     silhouettes: Silhouettes,
     slots: Vec<Slot>,
@@ -107,7 +109,7 @@ impl CpuBokeh {
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
-            encode: encode::EncodeTable::new(),
+            encoder: Arc::new(Encoder { table: EncodeTable::new(), curves: None }),
             tiles: Tiles::new(width, height),
             silhouettes: Silhouettes::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
@@ -142,7 +144,8 @@ impl CpuBokeh {
         if out.is_empty() {
             return ControlFlow::Continue(());
         }
-        let frame = InputFrame::new(&self.plan, T::as_pixels(pixels), coc);
+        let encoder = Arc::clone(&self.encoder);
+        let frame = InputFrame::new(&self.plan, T::as_pixels(pixels, &encoder), coc);
         self.split_bins(&frame);
         lap("split")?;
         // Where results are kept, the bins' buffers keep what they are made from.

@@ -193,7 +193,7 @@ impl CpuBokeh {
         let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles, silhouettes) = (&self.plan, &self.slots, &self.tiles, &self.silhouettes);
-        let (arch, encode) = (self.arch, &self.encode);
+        let (arch, encoder) = (self.arch, &*self.encoder);
         self.workers.run_with(
             &mut self.thread_scratch,
             plan.height.div_ceil(TILE_H),
@@ -209,7 +209,7 @@ impl CpuBokeh {
                     frame,
                     pixels,
                     gathered,
-                    encode,
+                    encoder,
                     y0,
                     layers,
                     held,

@@ -1,6 +1,7 @@
 //! Sample types of pictures in memory, and their circles of confusion.
 
-use super::encode::{CHUNK, EncodeTable};
+use super::encode::{CHUNK, Encoder};
+use crate::color::ToneCurves;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -9,6 +10,8 @@ use crate::optics::CocField;
 pub enum Pixels<'a> {
     /// 8-bit sRGB.
     Srgb(&'a [u8]),
+    /// 16-bit codes with these tone curves.
+    Codes16(&'a [u16], &'a ToneCurves),
     /// Linear light, 1 = sRGB white, with the primaries of sRGB. Before blurring, values are clamped to the range from
     /// 0 to [`Pixels::MAX_LIGHT`].
     Linear(&'a [f32]),
@@ -37,18 +40,18 @@ pub enum Radii<'a> {
 
 /// Type of a colour sample.
 pub trait Sample: Copy + Send + Sync {
-    /// Wraps samples as pixels of their kind.
-    fn as_pixels(samples: &[Self]) -> Pixels<'_>;
+    /// Wraps samples as pixels of their kind, which the encoder belongs to.
+    fn as_pixels<'a>(samples: &'a [Self], encoder: &'a Encoder) -> Pixels<'a>;
 
-    /// Returns samples as 8-bit codes, if they are.
+    /// Returns samples as 8-bit sRGB codes, if they are.
     fn as_codes(samples: &mut [Self]) -> Option<&mut [u8]>;
 
     /// Writes a chunk of linear light as samples; `out` may be shorter.
-    fn write(color: &[[f32; CHUNK]; 3], encode: &EncodeTable, out: &mut [Self]);
+    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [Self]);
 }
 
 impl Sample for u8 {
-    fn as_pixels(samples: &[u8]) -> Pixels<'_> {
+    fn as_pixels<'a>(samples: &'a [u8], _: &'a Encoder) -> Pixels<'a> {
         Pixels::Srgb(samples)
     }
 
@@ -57,13 +60,31 @@ impl Sample for u8 {
     }
 
     #[inline(always)]
-    fn write(color: &[[f32; CHUNK]; 3], encode: &EncodeTable, out: &mut [u8]) {
-        encode.encode(color, out);
+    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [u8]) {
+        encoder.table.encode(color, out);
+    }
+}
+
+impl Sample for u16 {
+    fn as_pixels<'a>(samples: &'a [u16], encoder: &'a Encoder) -> Pixels<'a> {
+        Pixels::Codes16(samples, encoder.curves())
+    }
+
+    fn as_codes(_: &mut [u16]) -> Option<&mut [u8]> {
+        None
+    }
+
+    #[inline(always)]
+    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [u16]) {
+        let curves = encoder.curves();
+        for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            *pixel = std::array::from_fn(|channel| curves.0[channel].encode(color[channel][x]));
+        }
     }
 }
 
 impl Sample for f32 {
-    fn as_pixels(samples: &[f32]) -> Pixels<'_> {
+    fn as_pixels<'a>(samples: &'a [f32], _: &'a Encoder) -> Pixels<'a> {
         Pixels::Linear(samples)
     }
 
@@ -72,7 +93,7 @@ impl Sample for f32 {
     }
 
     #[inline(always)]
-    fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
+    fn write(color: &[[f32; CHUNK]; 3], _: &Encoder, out: &mut [f32]) {
         // Next to very bright light, filters of few terms may sum to less than 0.
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             *pixel =

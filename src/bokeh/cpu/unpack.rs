@@ -111,8 +111,8 @@ impl<'a> InputFrame<'a> {
             Radii::Field(field, depth) => plan.matte(depth, field),
             Radii::Each(_) => None,
         };
-        // Only 8-bit codes are clipped at white.
-        let expansion = if matches!(pixels, Pixels::Srgb(_)) { plan.expansion } else { f32::INFINITY };
+        // Only codes are clipped at white.
+        let expansion = if matches!(pixels, Pixels::Linear(_)) { f32::INFINITY } else { plan.expansion };
         Self { size: (plan.width, plan.height), pixels, coc, matte, expansion }
     }
 
@@ -139,6 +139,14 @@ impl<'a> InputFrame<'a> {
                     for (light, &code) in plane[before..end].iter_mut().zip(codes) {
                         *light = decode_srgb::<S>(code);
                     }
+                }
+            }
+            Pixels::Codes16(rgb, curves) => {
+                let pixels = rgb[row][first * 3..].as_chunks::<3>().0[..count].iter();
+                let planes = red[before..].iter_mut().zip(&mut green[before..]).zip(&mut blue[before..]);
+                let [curve_r, curve_g, curve_b] = &curves.0;
+                for (pixel, ((r, g), b)) in pixels.zip(planes) {
+                    (*r, *g, *b) = (curve_r.decode(pixel[0]), curve_g.decode(pixel[1]), curve_b.decode(pixel[2]));
                 }
             }
             Pixels::Linear(rgb) => {
@@ -179,6 +187,7 @@ impl<'a> InputFrame<'a> {
         let values = (y * width + first) * 3..(y * width + end) * 3;
         match self.pixels {
             Pixels::Srgb(rgb) => prefetch(&rgb[values]),
+            Pixels::Codes16(rgb, _) => prefetch(&rgb[values]),
             Pixels::Linear(rgb) => prefetch(&rgb[values]),
         }
         match self.coc {

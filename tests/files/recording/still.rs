@@ -86,7 +86,10 @@ fn nothing_is_overwritten_unless_asked() {
 fn what_cannot_be_written_leaves_nothing() {
     let dir = TempDir::new().unwrap();
     for name in ["a.gif", "a", "a.pfm"] {
-        assert_says(write_color(&dir.path().join(name), &gradient(), false), &[name, "`.png` or `.jpg`"]);
+        assert_says(
+            write_color(&dir.path().join(name), &gradient(), false),
+            &[name, "`.png`, `.jpg`, `.tif` or `.webp`"],
+        );
     }
     assert_says(write_depth(&dir.path().join("a.jpg"), &DepthMap::new(2, 2), 1.0, false), &["`.png` or `.pfm`"]);
     assert_says(write_color(&dir.path().join("none/a.png"), &gradient(), false), &["cannot write", "none/a.png"]);

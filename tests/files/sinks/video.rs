@@ -68,6 +68,7 @@ fn files_are_whole_and_tagged() {
         ("mp4", 64, 48, "64,48,tv,smpte170m,smpte170m,smpte170m,5"),
         ("mkv", 33, 721, "32,720,tv,bt709,bt709,bt709,5"),
         ("webm", 64, 48, "64,48,tv,smpte170m,smpte170m,smpte170m,5"),
+        ("mov", 64, 48, "64,48,tv,smpte170m,smpte170m,smpte170m,5"),
     ] {
         let name = folder.path().join(format!("a: clip.{extension}"));
         let mut sink = open(&name, &options((width, height))).unwrap();
@@ -77,7 +78,7 @@ fn files_are_whole_and_tagged() {
         sink.finish(Ending::Complete).unwrap();
         assert_eq!(probe(&name, TAGS), expected, "{extension}");
         assert_eq!(times(&name), (vec![0, 40, 80, 120, 160], 200), "{extension}");
-        if extension == "mp4" {
+        if ["mp4", "mov"].contains(&extension) {
             let bytes = fs::read(&name).unwrap();
             let at = |kind: &[u8]| bytes.windows(4).position(|bytes| bytes == kind);
             assert!(at(b"moov") < at(b"mdat") && at(b"moof").is_none(), "the index is in front");
@@ -93,7 +94,7 @@ fn frames_keep_their_times() {
     let folder = tempfile::tempdir().unwrap();
     // Half the rate in the dark, two frames almost at once, and a camera that was unplugged for an hour.
     let at_ms = [0, 40, 80, 160, 240, 333, 334, 413, 3_600_413, 3_600_453];
-    for extension in ["mp4", "mkv", "webm"] {
+    for extension in ["mp4", "mkv", "webm", "mov"] {
         let name = folder.path().join(format!("clip.{extension}"));
         let mut sink = open(&name, &options((64, 48))).unwrap();
         for (ms, number) in at_ms.into_iter().zip(0..) {
@@ -112,7 +113,7 @@ fn frames_keep_their_times() {
 #[ignore = "needs ffmpeg"]
 fn colours_are_kept() {
     let folder = tempfile::tempdir().unwrap();
-    for extension in ["mp4", "mkv", "webm"] {
+    for extension in ["mp4", "mkv", "webm", "mov"] {
         let name = folder.path().join(format!("clip.{extension}"));
         let shown = picture(64, 48, 3);
         let mut sink = open(&name, &options((64, 48))).unwrap();

@@ -15,6 +15,7 @@ mod store;
 mod batch;
 mod behind;
 mod cli;
+mod colors;
 mod ctl;
 #[cfg(feature = "lab")]
 mod debug_dir;

@@ -48,8 +48,7 @@ fn difference(a: &ColorImage, b: &ColorImage, columns: std::ops::Range<usize>) -
 #[test]
 fn what_goes_with_a_picture_stays_with_it() {
     let home = Home::new();
-    let mut profile = vec![7; 200];
-    profile[16..20].copy_from_slice(b"RGB ");
+    let profile = moxcms::ColorProfile::new_display_p3().encode().unwrap();
     // EXIF with one entry, the camera's name.
     let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x10\0\x02\0\0\0\x04CAM\0\0\0\0\0".to_vec();
     let xmp =
@@ -57,20 +56,38 @@ fn what_goes_with_a_picture_stays_with_it() {
     let metadata =
         PhotoMetadata { icc_profile: Some(profile), exif: Some(exif), xmp: Some(xmp), ..PhotoMetadata::default() };
     write_photo(&home.path("in.jpg"), &ColorImage::new(40, 30), &metadata, false).unwrap();
-    for out in ["out.png", "out.jpg"] {
+    for out in ["out.png", "out.jpg", "out.webp", "out.tif"] {
         let said = render(&home, "in.jpg", out);
         assert_eq!(said.lines().count(), 1, "{said}");
-        assert_eq!(read_photo(&home.path(out)).unwrap().1, metadata, "{out}");
+        let mut kept = read_photo(&home.path(out)).unwrap().1;
+        if out == "out.tif" {
+            // EXIF is entries of the file itself there.
+            let exif = kept.exif.replace(metadata.exif.clone().unwrap()).unwrap();
+            assert!(exif.windows(4).any(|part| part == b"CAM\0"), "{exif:?}");
+        }
+        assert_eq!(kept, metadata, "{out}");
     }
+    // From TIFF to the others, too.
+    render(&home, "out.tif", "again.jpg");
+    let kept = read_photo(&home.path("again.jpg")).unwrap().1;
+    assert!(kept.exif.unwrap().windows(4).any(|part| part == b"CAM\0") && kept.xmp == metadata.xmp);
 }
 
 #[test]
 fn what_does_not_fit_is_said_once() {
     let home = Home::new();
     ImageBuffer::<Rgba<u16>, _>::from_pixel(40, 30, [1, 2, 3, 4].into()).save(home.path("in.png")).unwrap();
-    let said = render(&home, "in.png", "out.png");
-    assert_eq!(said.lines().count(), 2, "{said}");
-    assert!(said.starts_with("note: not in out.png: transparency, 16 bits a channel\n"), "{said}");
+    for (out, lost) in [
+        ("out.png", None),
+        ("out.tif", None),
+        ("out.webp", Some("16 bits a channel")),
+        ("out.jpg", Some("transparency, 16 bits a channel")),
+    ] {
+        let said = render(&home, "in.png", out);
+        assert_eq!(said.lines().count(), 1 + lost.iter().count(), "{said}");
+        let note = lost.map_or(String::new(), |lost| format!("note: not in {out}: {lost}\n"));
+        assert!(said.starts_with(&note), "{said}");
+    }
 }
 
 #[test]

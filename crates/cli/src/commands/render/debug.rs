@@ -15,11 +15,11 @@ use bokehcam::bokeh::plan::{Bin, Plan};
 use bokehcam::bokeh::{Bokeh, Probe};
 use bokehcam::compute::Backend;
 use bokehcam::computing::ComputeOptions;
-use bokehcam::engine::still::{Depth, compute_coc_and_depth};
+use bokehcam::engine::still::{Depth, compute_coc_and_depth, prepare_16bit};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::recording::still;
+use bokehcam::recording::{Photo, still};
 
 /// Name of the file of numbers, which is written even if nothing is blurred.
 pub const PLAN: &str = "plan.json";
@@ -88,38 +88,43 @@ impl Range {
     }
 }
 
-/// Blurs a picture on the CPU and writes every intermediate result into the folder `dir`; `force` overwrites existing
-/// files. Returns the blurred picture and a description of the executor.
+/// Blurs a photo on the CPU and writes every intermediate result into the folder `dir`; `force` overwrites existing
+/// files. Returns a description of the executor.
 ///
 /// # Errors
 /// Fails like the blur itself, or if a file in the folder exists without `force` or cannot be written.
 pub fn blur_and_dump(
-    mut color: ColorImage,
+    photo: &mut Photo,
     depth: Option<Depth>,
     look: &Look,
     computing: &ComputeOptions,
     (dir, force): (&Path, bool),
-) -> Result<(ColorImage, String), CliError> {
-    let size = color.size();
+) -> Result<String, CliError> {
+    let size = photo.color.size();
     let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::for_unblurred(size) };
-    let mut result = ColorImage::default();
-    match look.blur_settings(size, false) {
-        None => result = color,
-        Some(settings) => {
-            if computing.backend == Backend::Gpu || computing.adapter.is_some() {
-                let text = "--debug-dir needs the CPU executor: leave --backend gpu and --adapter out";
-                return Err(CliError::Usage(text.to_string()));
-            }
-            settings.check(size)?;
-            // Always the CPU executor: only its intermediates can be read.
-            let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
-            let (coc, depth) = compute_coc_and_depth(look, &mut color, depth)?;
-            bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
-            output.collect(&bokeh, &color, depth.as_ref(), &coc);
+    if let Some(settings) = look.blur_settings(size, false) {
+        if computing.backend == Backend::Gpu || computing.adapter.is_some() {
+            let text = "--debug-dir needs the CPU executor: leave --backend gpu and --adapter out";
+            return Err(CliError::Usage(text.to_string()));
         }
+        settings.check(size)?;
+        // Always the CPU executor: only its intermediates can be read.
+        let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
+        let color = &mut photo.color;
+        let (coc, depth) = match &mut photo.codes {
+            None => compute_coc_and_depth(look, color, depth)?,
+            Some(codes) => prepare_16bit(look, color, codes, depth)?,
+        };
+        let mut result = ColorImage::default();
+        match &mut photo.codes {
+            None => drop(bokeh.blur(color, depth.as_ref(), &coc, &mut result)?),
+            Some(codes) => *codes = bokeh.blur_16bit(codes, depth.as_ref(), &coc)?,
+        }
+        output.collect(&bokeh, color, depth.as_ref(), &coc);
+        *color = result;
     }
     output.write(dir, force)?;
-    Ok((result, output.plan.executor))
+    Ok(output.plan.executor)
 }
 
 /// The pictures with their file names, and the numbers.

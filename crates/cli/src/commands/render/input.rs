@@ -13,15 +13,14 @@ use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
-use bokehcam::recording::{PhotoMetadata, snapshot, still};
-use bokehcam::source::orientation::transform_picture;
+use bokehcam::recording::{Photo, snapshot, still};
+use bokehcam::source::orientation::transform_photo;
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
 
 /// Input of the blur.
 pub(super) struct Input {
-    pub color: ColorImage,
-    pub metadata: PhotoMetadata,
+    pub photo: Photo,
     pub depth: Option<Depth>,
     /// The origin of the depth.
     pub depth_from: DepthOrigin,
@@ -51,17 +50,18 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         // clap requires an image without `--like`.
         (image, _) => (image.clone().unwrap_or_default(), None),
     };
-    let (color, metadata) = still::read_photo(&image)?;
+    let mut photo = Photo::read(&image)?;
+    photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
-    let own_px = color.size();
-    let color = transform_picture(command.orientation, &image.display().to_string(), color)?;
-    let mut input = Input { color, metadata, depth: None, depth_from: DepthOrigin::Nothing, found: None };
-    if let Some(made) = compute_depth(command, look, (&input.color, own_px))? {
+    let own_px = photo.color.size();
+    transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;
+    let mut input = Input { photo, depth: None, depth_from: DepthOrigin::Nothing, found: None };
+    if let Some(made) = compute_depth(command, look, (&input.photo.color, own_px))? {
         // Masks and networks have their own scale.
         (input.depth, input.depth_from) = (Some(made), DepthOrigin::Metres);
     } else if let Some(file) = &command.depth_map {
         let (mut map, from) = read_depth(file, command, look, own_px)?;
-        source::find_person(&command.source_options(), look, &input.color, &mut map);
+        source::find_person(&command.source_options(), look, &input.photo.color, &mut map);
         (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
     } else if let Some(file) = kept_depth {
         let (map, from) = read_depth(&file, command, look, own_px)?;
@@ -74,14 +74,14 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
 
 /// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
 fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
-    let (found, notes) = photo::read_default_depth(image, &input.color, &command.source_options(), look)?;
+    let (found, notes) = photo::read_default_depth(image, &input.photo.color, &command.source_options(), look)?;
     notes.iter().for_each(|note| log::note(note));
     let Some(PhotoDepth { map, from, measured, by, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {
         plausible::warn_of_subject(None, &map, None);
     }
     input.found = Some(FoundDepth { measured, by, focus });
-    input.color = original.unwrap_or_else(|| std::mem::take(&mut input.color));
+    original.into_iter().for_each(|original| input.photo.replace_by_original(original));
     input.depth_from = from;
     input.depth = Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) });
     Ok(())

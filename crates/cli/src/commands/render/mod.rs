@@ -8,6 +8,7 @@ mod listing;
 mod map_folder;
 
 use std::fmt::Display;
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
@@ -25,7 +26,9 @@ use crate::settings::look;
 use crate::settings::unused;
 use crate::settings::unused::FrameOrigin;
 use crate::terminal;
+use bokehcam::bokeh::BokehError;
 use bokehcam::compute::Backend;
+use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
@@ -35,8 +38,8 @@ use bokehcam::engine::still::{Depth, Rendered};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
-use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, PhotoFormat};
+use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
@@ -87,7 +90,7 @@ pub struct RenderCommand {
     /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
     like: Option<PathBuf>,
-    /// File for the result, .png or .jpg. For many pictures a folder: each result has the name and kind of its picture.
+    /// File for the result, .png, .jpg, .tif or .webp. For many pictures a folder: each result has the name and kind of its picture.
     /// One that is already there is kept, even if it is older than its picture or has other settings, unless --force
     /// is given
     #[arg(long, alias = "to", value_name = "FILE")]
@@ -178,7 +181,9 @@ fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
 fn check_transparency(command: &RenderCommand, look: &Look) -> Result<(), CliError> {
     if look.background == Background::Transparent && still::photo_format(&command.out)? == PhotoFormat::Jpeg {
         let out = command.out.display();
-        return Err(CliError::Usage(format!("--behind transparent: {out}: JPEG keeps no transparency; use .png")));
+        return Err(CliError::Usage(format!(
+            "--behind transparent: {out}: JPEG keeps no transparency; use .png, .tif or .webp"
+        )));
     }
     Ok(())
 }
@@ -193,13 +198,13 @@ struct RenderedFile {
 
 /// Blurs the command's only picture, and writes the result.
 fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<RenderedFile, CliError> {
-    let Input { color, metadata, depth, depth_from, found } = read_input(command, look)?;
+    let Input { mut photo, depth, depth_from, found } = read_input(command, look)?;
     let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
     let look = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
     let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
-    command.warn_of_settings(&look, &color, (depth.as_ref(), depth_from, found.as_ref()), given);
+    command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
     // As in a stream of this photo: only measured depth is refined.
     let look = match &found {
         Some(found) if look.refine == Refine::Auto => {
@@ -208,24 +213,45 @@ fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result
         _ => look,
     };
     let computing = command.computing.to_compute_options();
-    let Rendered { color, alpha, by } = match &command.debug_dir {
-        Some(dir) => {
-            let (color, by) = debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?;
-            Rendered { color, alpha: None, by }
-        }
-        None => engine::still::render_picture(&look, color, depth, &computing)?,
+    let executor = match &command.debug_dir {
+        Some(dir) => debug::blur_and_dump(&mut photo, depth, &look, &computing, (dir, command.output.force))?,
+        None => blur(&mut photo, depth, &look, &computing)?,
     };
-    // The metadata's thumbnail would show the unblurred picture.
-    let mut metadata = metadata.without_thumbnail();
-    if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
-        metadata = metadata.for_jpeg();
+    let lost = photo.write(&command.out, command.output.force)?;
+    if !lost.is_empty() {
+        log::note(&format!("not in {}: {}", command.out.display(), lost.join(", ")));
     }
-    let picture = (&color, alpha.as_deref());
-    still::write_photo_with_alpha(&command.out, picture, &metadata, command.output.force)?;
-    if !metadata.lost_properties.is_empty() {
-        log::note(&format!("not in {}: {}", command.out.display(), metadata.lost_properties.join(", ")));
+    Ok(RenderedFile { executor, depth_by: found.map(|found| found.by) })
+}
+
+/// Blurs a photo; returns a description of the executor.
+fn blur(
+    photo: &mut Photo,
+    depth: Option<Depth>,
+    look: &Look,
+    computing: &ComputeOptions,
+) -> Result<String, BokehError> {
+    let color = mem::take(&mut photo.color);
+    let is_transparent = look.background == Background::Transparent;
+    let Some(picture) = photo.codes.take_if(|_| !is_transparent) else {
+        if photo.is_16bit {
+            log::note("--behind transparent: what is blurred gets 8 bits; what is sharp keeps its 16");
+        }
+        let before = photo.codes.is_some().then(|| color.clone());
+        let Rendered { color, alpha, by } = engine::still::render_picture(look, color, depth, computing)?;
+        if let (Some(codes), Some(before)) = (&mut photo.codes, before) {
+            codes.take_changes(&before.rgb, &color.rgb);
+        }
+        photo.color = color;
+        alpha.iter().for_each(|alpha| photo.multiply_alpha(alpha));
+        return Ok(by);
+    };
+    if computing.backend == Backend::Gpu || computing.adapter.is_some() {
+        log::note("16 bits and tone curves other than sRGB's are blurred by the processor, not the GPU");
     }
-    Ok(RenderedFile { executor: by, depth_by: found.map(|found| found.by) })
+    let (blurred, executor) = engine::still::blur_picture_16bit(look, color, picture, depth, computing.threads)?;
+    photo.codes = Some(blurred);
+    Ok(executor)
 }
 
 impl RenderCommand {

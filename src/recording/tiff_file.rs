@@ -1,0 +1,371 @@
+//! Writes photos as TIFF, and copies EXIF from and to TIFF files, in which it is spread over their directories.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Seek, Write};
+
+use image::error::ImageResult;
+use image::{ColorType, ImageDecoder};
+use tiff::decoder::Decoder;
+use tiff::encoder::colortype::{self, ColorType as TiffColor};
+use tiff::encoder::{Compression, DeflateLevel, DirectoryEncoder, TiffEncoder, TiffKindStandard, TiffValue};
+use tiff::tags::{ByteOrder, ExtraSamples, IfdPointer, Predictor, Tag, Type, ValueBuffer};
+use tiff::{Directory, TiffResult};
+
+use super::PhotoMetadata;
+use super::encode::{Raster, Samples};
+use super::tiff_directory::TiffDirectories;
+
+/// XMP packet (XMP specification, part 3).
+const XMP: Tag = Tag::Unknown(700);
+/// What a TIFF's own directory says about the photo: orientation, titles, names of camera and programs, time, author,
+/// rights, and Windows' texts. Its other entries describe the pixels.
+const DESCRIPTIVE: [u16; 15] = [269, 270, 271, 272, 274, 305, 306, 315, 316, 33432, 40091, 40092, 40093, 40094, 40095];
+/// Entries of EXIF that are positions in the file: of interoperability data.
+const POSITIONS: [u16; 1] = [40965];
+
+/// Bytes of entries that are copied; the rest is left out. Files may claim more than they have.
+const MAX_BYTES: usize = 8 << 20;
+
+/// An entry: tag, type, and values in this machine's byte order.
+type Entry = (Tag, Type, Vec<u8>);
+type Encoder<W> = TiffEncoder<W, TiffKindStandard>;
+
+/// EXIF as it is spread over the directories of a TIFF.
+struct Exif {
+    /// Entries of the picture's own directory.
+    descriptive: Vec<Entry>,
+    /// The directories of exposure and of position, with the tag that leads to each.
+    directories: [(Tag, Vec<Entry>); 2],
+}
+
+impl Exif {
+    fn new() -> Self {
+        Self {
+            descriptive: Vec::new(),
+            directories: [Tag::ExifDirectory, Tag::GpsDirectory].map(|tag| (tag, Vec::new())),
+        }
+    }
+
+    /// Reads EXIF data; what leads outside of it is left out.
+    fn parse(exif: &[u8]) -> Option<Self> {
+        let file = TiffDirectories::parse(exif)?;
+        let order = if exif.starts_with(b"MM") { ByteOrder::BigEndian } else { ByteOrder::LittleEndian };
+        let entries = |directory: usize| {
+            file.entries(directory).filter_map(move |(tag, kind, values)| {
+                let (kind, mut values) = (Type::from_u16(kind)?, values.to_vec());
+                order.convert(kind, &mut values, ByteOrder::native());
+                Some((Tag::from_u16_exhaustive(tag), kind, values))
+            })
+        };
+        let mut room = MAX_BYTES;
+        let own: Vec<Entry> = entries(file.u32_at(4)?).map_while(|entry| take_room(&mut room, entry)).collect();
+        let mut read = Self::new();
+        for (pointer, directory) in &mut read.directories {
+            let position = own.iter().find(|entry| entry.0 == *pointer).and_then(|entry| entry.2.first_chunk());
+            let found = position.into_iter().flat_map(|at| entries(u32::from_ne_bytes(*at) as usize));
+            directory.extend(found.map_while(|entry| take_room(&mut room, entry)));
+        }
+        read.descriptive = own;
+        Some(read.without_positions())
+    }
+
+    /// Reads the EXIF of a TIFF file.
+    fn read(decoder: &mut Decoder<impl Read + Seek>) -> TiffResult<Self> {
+        let (mut read, mut room) = (Self::new(), MAX_BYTES);
+        for tag in DESCRIPTIVE.map(Tag::from_u16_exhaustive) {
+            let mut value = ValueBuffer::empty(Type::BYTE);
+            if decoder.image_ifd().find_tag_buf(tag, &mut value).is_ok_and(|found| found.is_some()) {
+                read.descriptive.extend(take_room(&mut room, to_entry(tag, value)));
+            }
+        }
+        for (pointer, entries) in &mut read.directories {
+            let Some(at) = decoder.find_tag_unsigned::<u64>(*pointer)? else { continue };
+            let directory = decoder.read_directory(IfdPointer(at))?;
+            for (tag, _) in directory.iter() {
+                let mut value = ValueBuffer::empty(Type::BYTE);
+                decoder.read_directory_tags(&directory).find_tag_buf(tag, &mut value)?;
+                let Some(entry) = take_room(&mut room, to_entry(tag, value)) else { break };
+                entries.push(entry);
+            }
+        }
+        Ok(read.without_positions())
+    }
+
+    /// Leaves out the entries that describe the file instead of the photo.
+    fn without_positions(mut self) -> Self {
+        self.descriptive.retain(|entry| DESCRIPTIVE.contains(&entry.0.to_u16()));
+        self.directories
+            .iter_mut()
+            .for_each(|(_, entries)| entries.retain(|entry| !POSITIONS.contains(&entry.0.to_u16())));
+        self
+    }
+
+    /// Writes the directories beside the picture's own; returns their tags and positions.
+    fn write_directories<W: Write + Seek>(&self, encoder: &mut Encoder<W>) -> TiffResult<Vec<(Tag, u32)>> {
+        let mut positions = Vec::new();
+        for (pointer, entries) in self.directories.iter().filter(|(_, entries)| !entries.is_empty()) {
+            let mut directory = encoder.extra_directory()?;
+            write_entries(&mut directory, entries)?;
+            positions.push((*pointer, directory.finish_with_offsets()?.offset));
+        }
+        Ok(positions)
+    }
+
+    /// Writes the entries of the picture's own directory.
+    fn write_own<W: Write + Seek>(
+        &self,
+        directory: &mut DirectoryEncoder<W, TiffKindStandard>,
+        positions: &[(Tag, u32)],
+    ) -> TiffResult<()> {
+        write_entries(directory, &self.descriptive)?;
+        positions.iter().try_for_each(|&(pointer, position)| directory.write_tag(pointer, position))
+    }
+
+    /// Returns it as EXIF data; `None` if it is empty.
+    fn encode(&self) -> TiffResult<Option<Vec<u8>>> {
+        if self.descriptive.is_empty() && self.directories.iter().all(|(_, entries)| entries.is_empty()) {
+            return Ok(None);
+        }
+        let mut data = Vec::new();
+        let mut encoder = TiffEncoder::new(Cursor::new(&mut data))?;
+        let positions = self.write_directories(&mut encoder)?;
+        let mut own = encoder.image_directory()?;
+        self.write_own(&mut own, &positions)?;
+        own.finish()?;
+        Ok(Some(data))
+    }
+}
+
+fn to_entry(tag: Tag, mut value: ValueBuffer) -> Entry {
+    value.set_byte_order(ByteOrder::native());
+    (tag, value.data_type(), value.as_bytes().to_vec())
+}
+
+/// Returns an entry if there is room for it, and takes that.
+fn take_room(room: &mut usize, entry: Entry) -> Option<Entry> {
+    *room = room.checked_sub(entry.2.len())?;
+    Some(entry)
+}
+
+fn write_entries<W: Write + Seek>(
+    directory: &mut DirectoryEncoder<W, TiffKindStandard>,
+    entries: &[Entry],
+) -> TiffResult<()> {
+    for (tag, kind, values) in entries {
+        let entry = directory.write_entry_bytes(*kind, values)?;
+        directory.extend_from(&Directory::from_iter([(*tag, entry)]));
+    }
+    Ok(())
+}
+
+/// What the decoder of TIFF files leaves out.
+#[derive(Default)]
+pub(super) struct Undecoded {
+    exif: Option<Vec<u8>>,
+    /// The colour profile, whatever the type of its entry.
+    profile: Option<Vec<u8>>,
+    /// Whether colours are multiplied by alpha ("associated").
+    is_premultiplied: bool,
+}
+
+impl Undecoded {
+    /// Reads a TIFF file; nothing if it is damaged.
+    pub(super) fn read(file: &mut File) -> Self {
+        let Ok(mut decoder) = Decoder::new(BufReader::new(file)) else { return Self::default() };
+        let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten();
+        let mut profile = ValueBuffer::empty(Type::UNDEFINED);
+        let has_profile = matches!(decoder.image_ifd().find_tag_buf(Tag::IccProfile, &mut profile), Ok(Some(_)));
+        Self {
+            profile: has_profile.then(|| profile.as_bytes().to_vec()),
+            exif: Exif::read(&mut decoder).and_then(|exif| exif.encode()).ok().flatten(),
+            is_premultiplied: extra.is_some_and(|extra| extra.first() == Some(&ExtraSamples::AssociatedAlpha.to_u16())),
+        }
+    }
+}
+
+/// A decoder of a TIFF file that also gives what it leaves out itself. Colours are not multiplied by alpha.
+pub(super) struct TiffPhotoDecoder<D> {
+    pub(super) decoder: D,
+    pub(super) undecoded: Undecoded,
+}
+
+impl<D: ImageDecoder> ImageDecoder for TiffPhotoDecoder<D> {
+    fn dimensions(&self) -> (u32, u32) {
+        self.decoder.dimensions()
+    }
+    fn color_type(&self) -> ColorType {
+        self.decoder.color_type()
+    }
+    fn icc_profile(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.undecoded.profile.clone())
+    }
+    fn exif_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.undecoded.exif.clone())
+    }
+    fn xmp_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        self.decoder.xmp_metadata()
+    }
+    fn read_image(self, into: &mut [u8]) -> ImageResult<()> {
+        let color = self.decoder.color_type();
+        self.decoder.read_image(into)?;
+        match color {
+            ColorType::Rgba8 if self.undecoded.is_premultiplied => {
+                for [colors @ .., alpha] in into.as_chunks_mut::<4>().0 {
+                    *colors = colors.map(|color| divide_by_alpha(color.into(), (*alpha).into(), 255) as u8);
+                }
+            }
+            ColorType::Rgba16 if self.undecoded.is_premultiplied => {
+                for [colors @ .., alpha] in into.as_chunks_mut::<2>().0.as_chunks_mut::<4>().0 {
+                    let alpha = u16::from_ne_bytes(*alpha);
+                    *colors = colors.map(|color| {
+                        let color = u16::from_ne_bytes(color);
+                        (divide_by_alpha(color.into(), alpha.into(), 65535) as u16).to_ne_bytes()
+                    });
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+    fn read_image_boxed(self: Box<Self>, into: &mut [u8]) -> ImageResult<()> {
+        (*self).read_image(into)
+    }
+}
+
+/// Divides a colour by its alpha; `white` is the largest value of both. Where alpha is 0, it stays as it is.
+fn divide_by_alpha(color: u64, alpha: u64, white: u64) -> u64 {
+    (color * white + alpha / 2).checked_div(alpha).map_or(color, |divided| divided.min(white))
+}
+
+/// Appends a picture to `file`, which must be empty, as compressed TIFF, with its colour profile, EXIF and XMP.
+pub(super) fn encode_photo(raster: &Raster, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> TiffResult<()> {
+    let compression = Compression::Deflate(DeflateLevel::Fast);
+    let encoder = TiffEncoder::new(Cursor::new(file))?.with_compression(compression);
+    let encoder = encoder.with_predictor(Predictor::Horizontal);
+    match (&raster.samples, raster.has_alpha) {
+        (Samples::Bits8(samples), false) => write_image::<colortype::RGB8, _>(encoder, raster, samples, metadata),
+        (Samples::Bits8(samples), true) => write_image::<colortype::RGBA8, _>(encoder, raster, samples, metadata),
+        (Samples::Bits16(samples), false) => write_image::<colortype::RGB16, _>(encoder, raster, samples, metadata),
+        (Samples::Bits16(samples), true) => write_image::<colortype::RGBA16, _>(encoder, raster, samples, metadata),
+    }
+}
+
+fn write_image<C: TiffColor, W: Write + Seek>(
+    mut encoder: Encoder<W>,
+    raster: &Raster,
+    samples: &[C::Inner],
+    metadata: &PhotoMetadata,
+) -> TiffResult<()>
+where
+    [C::Inner]: TiffValue,
+{
+    let exif = metadata.exif.as_deref().and_then(Exif::parse).unwrap_or_else(Exif::new);
+    let positions = exif.write_directories(&mut encoder)?;
+    let mut image = encoder.new_image::<C>(raster.size.0, raster.size.1)?;
+    let own = image.encoder();
+    exif.write_own(own, &positions)?;
+    if raster.has_alpha {
+        own.write_tag(Tag::ExtraSamples, &[ExtraSamples::UnassociatedAlpha][..])?;
+    }
+    if let Some(profile) = &metadata.icc_profile {
+        write_entries(own, &[(Tag::IccProfile, Type::UNDEFINED, profile.clone())])?;
+    }
+    if let Some(packet) = &metadata.xmp {
+        own.write_tag(XMP, packet.as_bytes())?;
+    }
+    image.write_data(samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use tempfile::TempDir;
+
+    use super::super::Photo;
+    use super::*;
+
+    /// Returns big-endian EXIF with an entry of each directory.
+    fn exif() -> Vec<u8> {
+        let entry = |tag: u16, kind: u16, count: u32, value: [u8; 4]| {
+            [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &count.to_be_bytes(), &value].concat()
+        };
+        let own = [
+            entry(256, 4, 1, [0, 0, 0, 9]),
+            entry(271, 2, 4, *b"CAM\0"),
+            entry(0x8769, 4, 1, [0, 0, 0, 62]),
+            entry(0x8825, 4, 1, [0, 0, 0, 80]),
+        ];
+        let [exposure, position] = [entry(33434, 5, 1, [0, 0, 0, 98]), entry(1, 2, 2, *b"N\0\0\0")];
+        let head = [&b"MM\0*\0\0\0\x08\0\x04"[..], &own.concat(), &[0; 4]].concat();
+        assert_eq!(head.len(), 62);
+        [&head[..], &[0, 1], &exposure, &[0; 4], &[0, 1], &position, &[0; 4], &[0, 0, 0, 1, 0, 0, 0, 250]].concat()
+    }
+
+    #[test]
+    fn exif_survives_the_way_through_a_tiff() {
+        let dir = TempDir::new().unwrap();
+        let path = dir.path().join("a.tif");
+        let mut photo = Photo { alpha: Some(vec![0, 65535]), ..Photo::default() };
+        photo.color.resize(2, 1);
+        photo.metadata.exif = Some(exif());
+        photo.metadata.icc_profile = Some([&[7; 16][..], b"RGB ", &[7; 200]].concat());
+        let (alpha, profile) = (photo.alpha.clone(), photo.metadata.icc_profile.clone());
+        photo.write(&path, false).unwrap();
+        let read = |path: &std::path::Path| Photo::read(path).unwrap().metadata.exif.unwrap();
+        let first = Exif::parse(&read(&path)).unwrap();
+        assert_eq!(first.descriptive, [(Tag::Make, Type::ASCII, b"CAM\0".to_vec())]);
+        let [(_, exposure), (_, position)] = &first.directories;
+        let seconds = [1_u32, 250].map(u32::to_ne_bytes).concat();
+        assert_eq!(exposure, &[(Tag::Unknown(33434), Type::RATIONAL, seconds)]);
+        assert_eq!(position, &[(Tag::Unknown(1), Type::ASCII, b"N\0".to_vec())]);
+        // Again, by what was read.
+        Photo::read(&path).unwrap().write(&path, true).unwrap();
+        assert_eq!(Exif::parse(&read(&path)).unwrap().encode().unwrap(), first.encode().unwrap());
+        let again = Photo::read(&path).unwrap();
+        assert_eq!((again.alpha, again.metadata.icc_profile), (alpha, profile));
+    }
+
+    #[test]
+    fn exif_that_leads_nowhere_is_left_out() {
+        let whole = exif();
+        for length in 0..whole.len() {
+            if let Some(exif) = Exif::parse(&whole[..length]) {
+                exif.encode().unwrap();
+            }
+        }
+        for at in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 0xFF;
+            if let Some(exif) = Exif::parse(&damaged) {
+                exif.encode().unwrap();
+            }
+        }
+        // 60000 entries that all claim a million bytes.
+        let entry = [&[1, 15, 0, 1, 0, 15, 0x42, 0x40][..], &[0; 4]].concat();
+        let greedy = [&b"MM\0*\0\0\0\x08\xEA\x60"[..], &entry.repeat(60_000), &vec![0; 1 << 20]].concat();
+        let read = Exif::parse(&greedy).unwrap();
+        assert!(read.descriptive.iter().map(|entry| entry.2.len()).sum::<usize>() <= MAX_BYTES);
+    }
+
+    #[test]
+    fn colours_that_are_multiplied_by_alpha_are_divided_again() {
+        let dir = TempDir::new().unwrap();
+        let path = dir.path().join("a.tif");
+        for (extra, expected) in
+            [(ExtraSamples::AssociatedAlpha, [200, 100, 255, 9]), (ExtraSamples::UnassociatedAlpha, [100, 50, 200, 9])]
+        {
+            let mut file = Vec::new();
+            let mut encoder = TiffEncoder::new(Cursor::new(&mut file)).unwrap();
+            let mut image = encoder.new_image::<colortype::RGBA8>(2, 1).unwrap();
+            image.encoder().write_tag(Tag::ExtraSamples, &[extra][..]).unwrap();
+            image.write_data(&[100, 50, 200, 128, 9, 9, 9, 0]).unwrap();
+            fs::write(&path, file).unwrap();
+            let photo = Photo::read(&path).unwrap();
+            let found = [0, 1, 2, 3].map(|k| photo.color.rgb[k]);
+            let is_near = found.iter().zip(expected).all(|(found, expected): (&u8, u8)| found.abs_diff(expected) <= 1);
+            assert!(is_near, "{found:?}");
+            assert_eq!(photo.alpha, Some(vec![128 * 257, 0]));
+        }
+    }
+}
