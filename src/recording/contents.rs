@@ -34,6 +34,8 @@ pub(super) struct Contents {
     pub(super) unpaired: Unpaired,
     /// Whether times are recorded; otherwise [`Options::period_ns`] counts.
     pub(super) has_times: bool,
+    /// Whether colour pictures are photos, turned upright by their orientation tags.
+    pub(super) are_photos: bool,
     /// Whether these are scenes that [`Options::size`] has chosen.
     pub(super) is_chosen_by_size: bool,
     /// A folder of depth maps outside the recording's, with all links resolved.

@@ -101,6 +101,7 @@ pub struct Recording {
     disparity_count: Option<u32>,
     unpaired: Unpaired,
     has_times: bool,
+    are_photos: bool,
     is_chosen_by_size: bool,
 }
 
@@ -139,7 +140,8 @@ impl Recording {
         };
 
         folder.maps_root = contents.maps_root;
-        let size = read_first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
+        let read_size = if contents.are_photos { decode::read_upright_size } else { decode::read_size };
+        let size = read_first_size(&folder, contents.frames.iter().map(|frame| &frame.color), read_size)?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
         let frames: Vec<_> = listed
@@ -156,6 +158,7 @@ impl Recording {
             disparity_count: contents.disparity_count,
             unpaired: contents.unpaired,
             has_times: contents.has_times,
+            are_photos: contents.are_photos,
             is_chosen_by_size: contents.is_chosen_by_size,
         })
     }
@@ -242,9 +245,11 @@ impl Recording {
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
         let path = self.folder.locate(source)?;
-        decode::read_color(&path, Some(self.size), scratch, into)
-            .map(drop)
-            .map_err(|fault| source.error(&self.folder.dir, fault))
+        let read = match self.are_photos {
+            true => decode::read_upright(&path, self.size, scratch, into),
+            false => decode::read_color(&path, Some(self.size), scratch, into).map(drop),
+        };
+        read.map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
@@ -299,6 +304,7 @@ fn describe_expected_files() -> String {
 fn read_first_size<'a>(
     folder: &RecordingFolder,
     colors: impl Iterator<Item = &'a PictureSource>,
+    read_size: fn(&Path) -> Result<(u32, u32), PictureFault>,
 ) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name an unreadable file many times: open it once.
@@ -308,9 +314,9 @@ fn read_first_size<'a>(
             if unreadable.contains(&path) {
                 return Ok(None);
             }
-            let header = decode::read_header(&path).map_err(|fault| source.error(&folder.dir, fault));
+            let size = read_size(&path).map_err(|fault| source.error(&folder.dir, fault));
             unreadable.insert(path);
-            header.map(|(size, _)| Some(size))
+            size.map(Some)
         });
         match size {
             Ok(Some(size)) => return Ok(size),

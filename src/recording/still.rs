@@ -9,7 +9,6 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageFormat, RgbImage};
 
-use super::coded::EncodedPicture;
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
 use super::error::RecordingError;
@@ -36,9 +35,17 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 /// # Errors
 /// Same as for [`read_color`].
 pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingError> {
+    read_with_metadata(path).map_err(RecordingError::picture(path))
+}
+
+/// Does the same as [`read_color`].
+pub(super) fn read_upright(path: &Path) -> Result<ColorImage, PictureFault> {
+    read_with_metadata(path).map(|(image, _)| image)
+}
+
+fn read_with_metadata(path: &Path) -> Result<(ColorImage, PhotoMetadata), PictureFault> {
     let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    let read = decode::read_color(path, None, &mut scratch, &mut image);
-    let mut metadata = read.map_err(RecordingError::picture(path))?;
+    let mut metadata = decode::read_color(path, None, &mut scratch, &mut image)?;
     drop(scratch);
 
     let orientation = metadata.take_orientation();
@@ -57,11 +64,8 @@ pub(super) fn turned(image: ColorImage, orientation: Orientation) -> ColorImage 
 
 /// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.
 pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
-    if coded::read_kind(path)? == file_kind::HEIC {
-        return None;
-    }
-    let mut memory = Vec::new();
-    Some(EncodedPicture::open(path, &mut memory).ok()?.metadata().take_orientation())
+    let is_converted = coded::read_kind(path)? == file_kind::HEIC;
+    coded::read_orientation(path).ok().filter(|_| !is_converted)
 }
 
 /// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.

@@ -92,7 +92,7 @@ fn without_depth(dir: &Path, names: Vec<String>, options: &Options) -> Contents 
         right: None,
         depth: None,
     });
-    Contents { frames: frames.collect(), ..Contents::default() }
+    Contents { frames: frames.collect(), are_photos: true, ..Contents::default() }
 }
 
 /// Returns the folder of the depth maps for the pictures in `dir`, and the suffix of their stems.
@@ -116,7 +116,7 @@ fn refuse_other_sizes(folder: &RecordingFolder, names: &[String]) -> Result<(), 
     let (mut expected, mut locator) = (None, Locator::new(folder));
     for name in names {
         let source = PictureSource::from_path(name.into());
-        let Ok((found, _)) = decode::read_header(&locator.locate(&source)?) else { continue };
+        let Ok(found) = decode::read_upright_size(&locator.locate(&source)?) else { continue };
         let expected = *expected.get_or_insert(found);
         if found != expected {
             return Err(source.error(&folder.dir, PictureFault::Size { found, expected }));
