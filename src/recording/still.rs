@@ -19,6 +19,7 @@ use super::unit::MapUnit;
 use super::{check_depth_scale, coded, depth_covers, encode, pfm};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
+use crate::names;
 use crate::optics::StereoRig;
 
 /// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
@@ -170,13 +171,14 @@ pub fn write_photo(
     write(path, encoded, &file, force)
 }
 
-/// A file format for pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PhotoFormat {
-    /// Lossless.
-    Png,
-    /// Lossy, and smaller.
-    Jpeg,
+names::named! {
+    /// A file format for pictures, by the extension of its files.
+    pub enum PhotoFormat default Png {
+        /// Lossless
+        Png = "png",
+        /// Lossy, and smaller
+        Jpeg = "jpg",
+    }
 }
 
 /// Returns the picture format for a file name.

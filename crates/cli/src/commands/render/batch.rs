@@ -64,7 +64,7 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
         depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &["-depth", ".depth", ""])).transpose()?,
         mask: mask.map(|dir| MapFolder::read("--mask", dir, &["-mask", ".mask", ""])).transpose()?,
     };
-    let pictures = list_pictures(&command.images, &command.out)?;
+    let pictures = list_pictures(&command.images, &command.out, command.out_format)?;
     refuse_overwriting_inputs(command, &maps, &pictures)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
     warn_of_leftovers([command.out.as_path()]);

@@ -32,7 +32,8 @@ use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::{self, still::Depth};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
+use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
+use bokehcam::names;
 use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, PhotoFormat};
 use bokehcam::source::photo;
@@ -90,6 +91,9 @@ pub struct RenderCommand {
     /// is given
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
+    /// Format of the results of many pictures, png or jpg [default: that of each picture]
+    #[arg(long, value_name = "FORMAT", value_parser = names::parse_name::<PhotoFormat>)]
+    out_format: Option<PhotoFormat>,
     /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
     /// filters, the filled background; and plan.json (CPU executor)
     #[arg(long, value_name = "DIR")]
@@ -113,6 +117,10 @@ pub struct RenderCommand {
 pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     if listing::is_many(&command.images, &command.out) {
         return batch::run(&command, global, given);
+    }
+    if let Some(format) = command.out_format {
+        let what = format!("--out-format {format}: the name behind --out decides; the option is for many pictures");
+        return Err(CliError::Usage(what));
     }
     command.image = command.images.pop();
     check_outputs(&command)?;
