@@ -181,18 +181,14 @@ struct Rendered {
 fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<Rendered, CliError> {
     let Input { color, metadata, depth, depth_from, found } = read_input(command, look)?;
     let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
-    let look = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
-    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
+    let known = SourceDepth { has_depth: depth.is_some(), is_relative: depth_from.is_relative(), size: color.size() };
+    let wanted = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
+    let adapted = source::adapt_look(&wanted, &command.blur.depth, known)?;
+    focus::note_place(look, &adapted);
+    let look = adapted;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &color, (depth.as_ref(), depth_from, found.as_ref()), given);
-    // As in a stream of this photo: only measured depth is refined.
-    let look = match &found {
-        Some(found) if look.refine == Refine::Auto => {
-            Look { refine: if found.measured { Refine::On } else { Refine::Off }, ..look }
-        }
-        _ => look,
-    };
     let computing = command.computing.to_compute_options();
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(color, depth, &look, &computing, (dir, command.output.force))?,
