@@ -25,6 +25,7 @@ mod heif;
 mod jpeg;
 mod kitti;
 mod list;
+pub mod map_sequence;
 mod middlebury;
 mod options;
 mod pair;
@@ -220,6 +221,12 @@ impl Recording {
     /// Returns whether the frames have depth.
     pub fn has_depth(&self) -> bool {
         self.depth.is_some()
+    }
+
+    /// Returns the file names of the colour pictures, without extension; empty for lines that name none.
+    pub fn picture_stems(&self) -> Vec<String> {
+        let stem = |frame: &Frame| frame.color.file.as_deref().ok()?.file_stem()?.to_str().map(str::to_owned);
+        self.frames.iter().map(|frame| stem(frame).unwrap_or_default()).collect()
     }
 
     /// Returns the stereo geometry, if the frames have right pictures.

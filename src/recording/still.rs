@@ -211,6 +211,11 @@ pub fn is_photo(path: &Path) -> bool {
     }
 }
 
+/// Returns whether a file is a GIF, by its first bytes.
+pub fn is_gif(path: &Path) -> bool {
+    coded::read_kind(path) == Some(FileKind::Other(ImageFormat::Gif))
+}
+
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown, as is depth beyond 65535 units; or
 /// a `.pfm` in metres. The metadata of either file states that it holds depth (and the scale of a `.png`), so it can be
 /// read back without options.

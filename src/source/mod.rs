@@ -120,6 +120,10 @@ pub struct Findings {
     pub focus: Option<FocusRule>,
     /// The sharp original inside a photo, which is then the picture.
     pub original: Option<ColorImage>,
+    /// Whether the depth of a photo fits it already.
+    pub is_fitting: bool,
+    /// The file names of a recording's pictures, without extension.
+    pub picture_stems: Vec<String>,
 }
 
 /// Options for opening a source.
@@ -194,8 +198,12 @@ impl Source {
         let Options { frames, stereo, depth_choice, computing, .. } = request.options;
         name.check_frames(frames)?;
         request.check_effect()?;
-        if request.options.depth.depth_unit == Some(DepthUnit::Disparity) && !matches!(name, SourceName::Photo(_)) {
-            return Err(SourceError::Usage("--depth-unit disparity is only for the depth map of a photo".to_owned()));
+        if request.options.depth.depth_unit == Some(DepthUnit::Disparity)
+            && !matches!(name, SourceName::Photo(_))
+            && depth_choice.map_folder().is_none()
+        {
+            let what = "--depth-unit disparity is only for the depth map of a photo, and folders of depth maps";
+            return Err(SourceError::Usage(what.to_owned()));
         }
         let mut source = Opened::open(name, request)?;
         if stereo.side_by_side {
@@ -252,10 +260,12 @@ impl Source {
         adapt_look(&Look { focus, ..look.clone() }, &options.depth_choice, SourceDepth { has_depth, is_relative, size })
     }
 
-    /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.
+    /// Returns whether its depth is measured (not computed exactly), so that refinement improves it. The depth of a photo
+    /// is that only if it does not fit the photo.
     pub fn is_measured(&self) -> bool {
         let is_made = matches!(self.depth_from, DepthOrigin::Networks | DepthOrigin::Plate);
-        self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
+        let is_exact = is_made || self.findings.is_fitting;
+        self.depth.is_some() && !is_exact && (self.rig.is_none() || REFINES_STEREO)
     }
 
     /// Creates a run of its frames ([`Run::with_blur`]) with this blur into `sink`, as fast as possible. `stop` ends the run.

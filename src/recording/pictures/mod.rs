@@ -23,10 +23,15 @@ pub(super) const LAYOUT: Layout = Layout {
 };
 
 /// Suffixes of depth maps in the folder of the pictures.
-const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
+pub(super) const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
 
 fn is_map(stem: &str) -> bool {
     MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
+}
+
+/// Returns whether `dir` has pictures and their depth maps.
+pub(super) fn has_own_maps(dir: &Path) -> bool {
+    has_pictures(dir, |stem| !is_map(stem)) && find_maps(dir).is_some()
 }
 
 /// Returns the folder of a pattern's pictures, such as `DIR` of `DIR/IMG_%04d.jpg`; `None` if the path is not a
