@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
-use bokehcam::look::{Look, Refine};
+use bokehcam::look::{Look, Refine, SourceDepth};
 use bokehcam::recording::still::check_depth_size;
 use bokehcam::source::{DepthChoice, adapt_look};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
@@ -43,7 +43,8 @@ impl Still {
         if let Some(Aperture { shape, rim }) = aperture {
             (look.aperture, look.rim) = (shape.clone(), *rim);
         }
-        let look = adapt_look(&look, &DepthChoice::Auto, has_depth).map_err(errors::value)?;
+        let look = adapt_look(&look, &DepthChoice::Auto, SourceDepth { has_depth, ..SourceDepth::default() })
+            .map_err(errors::value)?;
         let executor = look.blur_settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
         let executor = py.detach(|| executor.transpose()).map_err(errors::value)?.map(Mutex::new);
         Ok(Self { look, executor })

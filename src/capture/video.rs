@@ -1,11 +1,15 @@
 //! A video file as a camera.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::replay::PlayRange;
-use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, Seeker, SourceInfo};
 use crate::frame::{ColorImage, Stamp};
 use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
+
+/// Largest number of frames of a video that can be sought in: two days at 30 per second, or 40 MiB of times.
+const MAX_SEEK_FRAMES: u64 = 5 << 20;
 
 /// How long before the end of a lap the decoder of the next one starts, in seconds.
 const LAP_STARTUP_S: f64 = 1.0;
@@ -25,8 +29,10 @@ pub struct Video {
     /// A fault at the end of a lap that is not reported yet.
     fault: Option<VideoError>,
     has_ended: bool,
-    /// Number of frames decoded in this lap.
+    /// Number of frames decoded in this lap, or skipped by a seek.
     in_lap: usize,
+    /// Whether this lap began with a seek.
+    seeks_to: bool,
     /// Time in the file of the lap's first picture; `None` before it.
     lap_start_ns: Option<i64>,
     /// Media time at which the lap began.
@@ -35,6 +41,8 @@ pub struct Video {
     last_ns: Option<u64>,
     /// Number of frames read or skipped.
     delivered: u64,
+    /// `None` if frames are counted, or their number is unknown.
+    seeker: Option<Arc<Seeker>>,
 }
 
 impl Video {
@@ -53,6 +61,13 @@ impl Video {
         let start_s = if seeks { range.start_s } else { 0.0 };
         let conversion = Conversion { size_px, pixels: Pixels::Rgb24, fps, start_s };
         let decoder = Decoder::start(&file, &conversion)?;
+        let period_ns = fps.map_or(file.period_ns, |fps| (1e9 / fps) as u64);
+        let frames = VideoFile { period_ns, ..file.clone() }.count_frames(range.start_s, range.end_s);
+        // The time of a frame in the middle is that of a constant rate.
+        let seeker = frames.filter(|&frames| seeks && (1..=MAX_SEEK_FRAMES).contains(&frames)).map(|frames| {
+            let times_ns = (0..frames).map(|frame| frame * period_ns).collect();
+            Arc::new(Seeker::new(0, times_ns, frames * period_ns))
+        });
         let mut video = Self {
             picture: ColorImage::new(size_px.0, size_px.1),
             file,
@@ -64,10 +79,12 @@ impl Video {
             fault: None,
             has_ended: false,
             in_lap: 0,
+            seeks_to: false,
             lap_start_ns: None,
             lap_began_ns: 0,
             last_ns: None,
             delivered: 0,
+            seeker,
         };
         // Faults of the whole file are known before an output begins.
         while !video.prepare(MAX_WAIT)? && !video.has_ended {}
@@ -98,11 +115,19 @@ impl Video {
                     self.prepare_next_lap(time_ns)?;
                     if self.range.end_s.is_some_and(|end_s| time_ns as f64 >= end_s * 1e9) {
                         self.end_lap()?;
-                    } else if self.conversion.start_s > 0.0 || time_ns as f64 >= self.range.start_s * 1e9 {
+                    } else if self.seeks_to
+                        || self.conversion.start_s > 0.0
+                        || time_ns as f64 >= self.range.start_s * 1e9
+                    {
                         self.ready_ns = Some(self.media_time_ns(time_ns));
                     }
                 }
-                Ok(Decoded::End) => self.end_lap()?,
+                Ok(Decoded::End) => {
+                    // Once, not in every lap.
+                    let remark = self.decoder.take_remark().filter(|_| self.lap_began_ns == 0);
+                    remark.iter().for_each(|remark| tracing::warn!("{remark}"));
+                    self.end_lap()?;
+                }
                 Err(fault @ VideoError::Damaged { .. }) => {
                     self.fault = Some(fault);
                     self.end_lap()?;
@@ -138,12 +163,28 @@ impl Video {
             return Ok(());
         }
         self.lap_began_ns = self.last_ns.unwrap_or(0).saturating_add(self.period_ns());
-        (self.in_lap, self.lap_start_ns) = (0, None);
+        (self.in_lap, self.lap_start_ns, self.seeks_to) = (0, None, false);
         self.decoder = match self.next_lap.take() {
             Some(decoder) => decoder,
             None => Decoder::start(&self.file, &self.conversion)?,
         };
         Ok(())
+    }
+
+    /// Continues with the frame at a position at the media time `next_ns`; returns whether there is one.
+    fn begin_at(&mut self, position: usize, next_ns: u64) -> bool {
+        let period_ns = self.period_ns();
+        // The decoder begins at the first frame from this time on: half a period earlier allows for rounding.
+        let ahead_s = (position as u64 * period_ns).saturating_sub(period_ns / 2) as f64 / 1e9;
+        let conversion = Conversion { start_s: self.range.start_s + ahead_s, ..self.conversion };
+        // An error comes again with the next lap.
+        let Ok(decoder) = Decoder::start(&self.file, &conversion) else { return false };
+        (self.decoder, self.next_lap, self.ready_ns) = (decoder, None, None);
+        (self.in_lap, self.lap_start_ns, self.lap_began_ns) = (position, None, next_ns);
+        (self.seeks_to, self.has_ended) = (position > 0, false);
+        // The frame that is asked for is the next one to be read.
+        while !self.prepare(MAX_WAIT).unwrap_or(true) && !self.has_ended {}
+        self.ready_ns.is_some()
     }
 
     /// Starts the decoder of the next lap if this one, which is at `time_ns` in the file, ends soon.
@@ -201,5 +242,15 @@ impl Camera for Video {
             self.delivered += 1;
         }
         self.delivered - from
+    }
+
+    fn seeker(&self) -> Option<Arc<Seeker>> {
+        self.seeker.clone()
+    }
+
+    fn seek(&mut self, position: usize) -> i64 {
+        let next_ns = self.last_ns.map_or(0, |last_ns| last_ns.saturating_add(self.period_ns()));
+        let position = [position, 0].into_iter().find(|&position| self.begin_at(position, next_ns)).unwrap_or(0);
+        (position as u64 * self.period_ns()).wrapping_sub(next_ns).cast_signed()
     }
 }

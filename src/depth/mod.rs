@@ -18,6 +18,8 @@ mod guided_fill;
 pub mod live;
 #[cfg(feature = "files")]
 pub mod looped_recording;
+#[cfg(feature = "files")]
+pub mod map_sequence;
 pub mod matting;
 pub mod misalignment;
 pub mod motion;

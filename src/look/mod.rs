@@ -96,6 +96,9 @@ pub struct Look {
     pub quality: Option<Quality>,
     /// Whether a stream keeps parts of the result from earlier frames.
     pub reuse: Reuse,
+    /// Whether depth is relative ([`Look::for_source`]): then the strength is the radius for a difference of inverse depth
+    /// from the nearest to the farthest point.
+    pub is_depth_relative: bool,
 }
 
 impl Default for Look {
@@ -120,6 +123,7 @@ impl Default for Look {
             highlights: 0.0,
             quality: None,
             reuse: Reuse::Auto,
+            is_depth_relative: false,
         }
     }
 }
@@ -163,6 +167,21 @@ impl Look {
         Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
     }
 
+    /// Returns the look that reproduces the blur of one frame from its colours and its depth in a file, in which relative
+    /// depth is written as metres. Otherwise as [`Look::for_frame`].
+    pub fn for_saved_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
+        let look = self.for_frame(coc, quality);
+        match coc {
+            CocField::Depth(coc) if look.is_depth_relative => Self {
+                strength: Strength::AtInfinity(coc.coc_at_infinity_px),
+                max_coc_px: Some(coc.max_coc_px),
+                is_depth_relative: false,
+                ..look
+            },
+            _ => look,
+        }
+    }
+
     /// Returns the executor's settings for pictures of `size` pixels; `None` if frames pass through. `adaptive` says
     /// whether the quality may follow the time available.
     pub fn blur_settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
@@ -197,6 +216,7 @@ impl Look {
                 focus: self.focus,
                 lens: match self.strength {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
+                    _ if self.is_depth_relative => CocAtInfinity::Relative(self.coc_at_infinity_px(size)),
                     _ => CocAtInfinity::Px(self.coc_at_infinity_px(size)),
                 },
                 range_m: self.focus_range_m,

@@ -105,8 +105,8 @@ settings! {
     effect: Effect = "effect" "WHAT" Blur Effect::from_str, one of list_choices::<Effect>();
     /// How dof is composited
     method: Method = "method" "HOW" Blur Method::from_str, one of list_choices::<Method>();
-    /// Distance of the focal plane: METRES, auto, X,Y as fractions of width and height, or track:X,Y, the object there
-    /// at the start
+    /// Distance of the focal plane: METRES (in relative depth a place from 0, the nearest, to 1, the farthest), auto, X,Y
+    /// as fractions of width and height, or track:X,Y, the object there at the start
     focus: FocusRule = "focus" "WHERE" Blur FocusRule::from_str;
     /// Range of distances that is completely sharp, in metres, half of it on either side of the focal plane
     focus_range_m: f32 = "focus-range" "METRES" Blur parse_non_negative, in 0.0..=f32::MAX;

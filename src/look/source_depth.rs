@@ -2,6 +2,7 @@
 
 use super::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::depth::focus::FocusRule;
+use crate::frame::DepthMap;
 
 /// What is known about a source's depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,26 +15,22 @@ pub struct SourceDepth {
     pub size: (u32, u32),
 }
 
-/// Distance at which relative depth places the nearest points.
-const RELATIVE_NEAREST_M: f32 = 1.0;
-
 impl Look {
     /// Adapts the look to a source. Without depth there is no subject to keep sharp, and everything is blurred equally.
-    /// With relative depth there are no metres: a focus distance becomes focus on the subject, and a lens becomes the
-    /// equivalent amount of blur.
+    /// With relative depth there are no metres: a focus from 0 to 1 is a place, any other distance becomes focus on the
+    /// subject, and a lens becomes the equivalent amount of blur.
     pub fn for_source(&self, known: SourceDepth) -> Self {
         let mut look = self.clone();
         if look.effect.follows_depth() && !known.has_depth {
             look.effect = Effect::Blur;
         }
-        if known.has_depth && known.is_relative {
+        look.is_depth_relative = known.has_depth && known.is_relative;
+        look.focus = look.focus.for_depth(look.is_depth_relative).unwrap_or(FocusRule::Auto);
+        if look.is_depth_relative {
             if let Strength::Lens(lens) = look.strength {
                 let (width, height) = known.size;
                 look.strength =
-                    Strength::from_fraction(lens.coc_at_infinity_px(RELATIVE_NEAREST_M, width) / height.max(1) as f32);
-            }
-            if matches!(look.focus, FocusRule::Metres(_)) {
-                look.focus = FocusRule::Auto;
+                    Strength::from_fraction(lens.coc_at_infinity_px(DepthMap::SUBJECT_M, width) / height.max(1) as f32);
             }
             look.focus_range_m = 0.0;
         }
@@ -51,5 +48,33 @@ impl Strength {
             usual if (usual - percent(COC_AT_INFINITY_PER_HEIGHT)).abs() < 0.011 => Self::Default,
             other => Self::Percent(other.min(MAX_COC_PER_HEIGHT * 100.0)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::look::{CocAtInfinity, CocRule};
+
+    #[test]
+    fn a_number_is_a_place_only_where_there_are_no_metres() {
+        let focus = |text: &str, is_relative| {
+            let look = Look { focus: text.parse().unwrap(), ..Look::default() };
+            let look = look.for_source(SourceDepth { has_depth: true, is_relative, size: (640, 480) });
+            assert_eq!(look.for_source(SourceDepth { has_depth: true, is_relative, size: (640, 480) }), look);
+            let CocRule::Depth { lens, .. } = look.coc_rule((640, 480)) else { unreachable!("by depth") };
+            assert_eq!(matches!(lens, CocAtInfinity::Relative(_)), is_relative);
+            (look.focus, look.focus.to_string())
+        };
+        for (text, place) in [("0", 0.0), ("0.25", 0.25), ("1", 1.0)] {
+            assert_eq!(focus(text, true), (FocusRule::Relative(place), text.to_owned()));
+        }
+        assert_eq!(focus("0.25", false), (FocusRule::Metres(0.25), "0.25".to_owned()));
+        assert_eq!((focus("1.5", true).0, focus("1.5", false).0), (FocusRule::Auto, FocusRule::Metres(1.5)));
+        // From one source to the other, the number stays.
+        let metric = SourceDepth { has_depth: true, ..SourceDepth::default() };
+        let look = Look { focus: FocusRule::Relative(0.25), ..Look::default() };
+        assert_eq!(look.for_source(metric).focus, FocusRule::Metres(0.25));
+        assert_eq!(FocusRule::Relative(0.0).for_depth(false), None);
     }
 }

@@ -9,6 +9,7 @@ use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::path::Path;
 
 use image::codecs::jpeg::JpegDecoder;
+use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::MAX_SIDE_PX;
@@ -31,6 +32,9 @@ const MAX_JPEG_BYTES: u64 = 96 << 20;
 
 /// Largest float map accepted: 4 bytes per pixel, and room for a header.
 const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
+
+/// Part of a JPEG that has its EXIF: a segment of 64 KiB, after those of JFIF and other small ones.
+const MAX_EXIF_START_BYTES: u64 = 256 << 10;
 
 /// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
@@ -89,14 +93,6 @@ impl<'a> EncodedPicture<'a> {
 
     fn open_png(file: File) -> Result<Self, PictureFault> {
         Ok(Self::Png(Box::new(create_png_decoder(file)?.read_info().map_err(png_fault)?)))
-    }
-
-    /// Returns the metadata before the pixels.
-    pub(super) fn metadata(self) -> PhotoMetadata {
-        match self {
-            Self::Png(reader) => PhotoMetadata::from_png(reader.info()),
-            Self::Whole(mut decoder) => PhotoMetadata::from_decoder(&mut *decoder),
-        }
     }
 
     /// Returns the colour profile, before the pixels.
@@ -231,6 +227,26 @@ pub(super) fn read_whole(path: &Path) -> Result<(Vec<u8>, Option<FileKind>), Pic
         read_from_start(file, MAX_JPEG_BYTES, &mut bytes)?;
     }
     Ok((bytes, kind))
+}
+
+/// Reads the orientation tag of a picture from its beginning only; none counts as upright.
+pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault> {
+    let (file, kind) = open_detected(path)?;
+    let of_exif = |exif: &[u8]| Orientation::from_exif_chunk(exif);
+    let orientation = match kind {
+        Some(FileKind::Png) => {
+            let info = create_png_decoder(file)?.read_info().map_err(png_fault)?;
+            info.info().exif_metadata.as_deref().and_then(of_exif)
+        }
+        Some(FileKind::Jpeg) => {
+            let mut start = Vec::new();
+            file.take(MAX_EXIF_START_BYTES).read_to_end(&mut start)?;
+            jpeg::find_exif(&start).and_then(of_exif)
+        }
+        Some(FileKind::Other(format)) => create_decoder(file, format)?.orientation().ok(),
+        _ => None,
+    };
+    Ok(orientation.unwrap_or(Orientation::NoTransforms))
 }
 
 /// Returns the kind of a file by its first bytes; `None` if it is unknown or cannot be read.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::container::Container;
-use super::decode::{self, DepthUnits};
+use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
@@ -35,6 +35,8 @@ pub(super) struct Contents {
     pub(super) unpaired: Unpaired,
     /// Whether times are recorded; otherwise [`Options::period_ns`] counts.
     pub(super) has_times: bool,
+    /// Whether colour pictures are photos, turned upright by their orientation tags.
+    pub(super) are_photos: bool,
     /// Whether these are scenes that [`Options::size`] has chosen.
     pub(super) is_chosen_by_size: bool,
     /// A folder of depth maps outside the recording's, with all links resolved.
@@ -193,6 +195,7 @@ impl PictureSource {
 pub(super) fn read_first_size<'a>(
     folder: &RecordingFolder,
     colors: impl Iterator<Item = &'a PictureSource>,
+    read_size: fn(&Path) -> Result<(u32, u32), PictureFault>,
 ) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name an unreadable file many times: open it once.
@@ -202,9 +205,9 @@ pub(super) fn read_first_size<'a>(
             if unreadable.contains(&path) {
                 return Ok(None);
             }
-            let header = decode::read_header(&path).map_err(|fault| source.error(&folder.dir, fault));
+            let size = read_size(&path).map_err(|fault| source.error(&folder.dir, fault));
             unreadable.insert(path);
-            header.map(|(size, _)| Some(size))
+            size.map(Some)
         });
         match size {
             Ok(Some(size)) => return Ok(size),

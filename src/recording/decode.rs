@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use image::metadata::Orientation;
 use pulp::{Arch, WithSimd};
 
 use super::coded::{self, EncodedPicture};
@@ -9,6 +10,7 @@ use super::depth_covers;
 use super::fault::PictureFault;
 use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
 use super::samples::SampleFormat;
+use super::still;
 use crate::color::{luminance, round_to_8bit};
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
@@ -79,6 +81,44 @@ pub(super) fn check_color_size(found: (u32, u32), expected: (u32, u32)) -> Resul
 /// Rejects a depth map that does not cover a picture of `color` pixels.
 pub(super) fn check_depth_size(found: (u32, u32), color: (u32, u32)) -> Result<(), PictureFault> {
     if depth_covers(found, color) { Ok(()) } else { Err(PictureFault::DepthSize { found, color }) }
+}
+
+/// Reads width and height of a picture from its header only.
+pub(super) fn read_size(path: &Path) -> Result<(u32, u32), PictureFault> {
+    coded::read_header(path).map(|(size, _)| size)
+}
+
+/// Reads width and height of a picture as it is turned upright by its orientation tag, from its header only.
+pub(super) fn read_upright_size(path: &Path) -> Result<(u32, u32), PictureFault> {
+    let (width, height) = read_size(path)?;
+    // Faults are reported by whatever decodes the picture.
+    let is_sideways = coded::read_orientation(path).is_ok_and(is_sideways);
+    Ok(if is_sideways { (height, width) } else { (width, height) })
+}
+
+fn is_sideways(orientation: Orientation) -> bool {
+    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
+}
+
+/// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag; its size is then `expected`.
+pub(super) fn read_upright(
+    path: &Path,
+    expected: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut ColorImage,
+) -> Result<(), PictureFault> {
+    let orientation = coded::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    if orientation == Orientation::NoTransforms {
+        return read_color(path, Some(expected), scratch, into).map(drop);
+    }
+    let found = read_upright_size(path)?;
+    if found != expected {
+        return Err(PictureFault::Size { found, expected });
+    }
+    read_color(path, None, scratch, into)?;
+    *into = still::turned(std::mem::take(into), orientation);
+    Ok(())
 }
 
 /// Decodes an opened picture as [`read_color`] does. `pixels` is working memory.

@@ -85,6 +85,12 @@ pub enum RecordingError {
         /// The folder of depth maps.
         depth: String,
     },
+    /// A folder of depth maps does not belong to the pictures.
+    #[error(
+        "{}: {maps} depth maps for {pictures} pictures or more; export one for each, numbered or named alike",
+        dir.display()
+    )]
+    MapCount { dir: PathBuf, maps: u64, pictures: u64 },
     /// A film must be converted first.
     #[error(
         "{0}/rgb.mp4: split it into pictures first, and give the folder again: mkdir '{0}/rgb' && ffmpeg -i \

@@ -214,6 +214,17 @@ pub enum PictureFault {
          --grayscale, --pred-only, cmap=\"gray\", or .npy)"
     )]
     ColoredDepth,
+    /// Colours of a known colour map stand for depth.
+    #[error(
+        "it has the colours of {name}; add --depth-unit inverse if {near} is near, or --depth-unit inverse \
+         --depth-invert if {far} is near"
+    )]
+    ColorMapped {
+        /// The name of the colour map.
+        name: &'static str,
+        near: &'static str,
+        far: &'static str,
+    },
     /// The picture is not a depth map.
     #[error(
         "{0} is not depth; export depth as a 16-bit grey PNG; for inverse depth, where white is near, use --depth-unit \

@@ -13,7 +13,12 @@ const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// Splits the file name of a PNG or JPEG into stem and ending; `None` for another name.
 fn split_name(name: &str) -> Option<(&str, &str)> {
-    let is_known = |ending: &str| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known));
+    split_known(name, &ENDINGS)
+}
+
+/// Splits the file name of a file with one of these endings.
+fn split_known<'a>(name: &'a str, endings: &[&str]) -> Option<(&'a str, &'a str)> {
+    let is_known = |ending: &str| endings.iter().any(|known| ending.eq_ignore_ascii_case(known));
     name.rsplit_once('.').filter(|(stem, ending)| !stem.is_empty() && !stem.starts_with('.') && is_known(ending))
 }
 
@@ -22,10 +27,22 @@ fn split_name(name: &str) -> Option<(&str, &str)> {
 /// # Errors
 /// The folder cannot be listed, or contains more than [`MAX_ENTRIES`] of them.
 pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>, RecordingError> {
+    find_files(folder, &ENDINGS, wanted)
+}
+
+/// Does the same for files with these endings.
+///
+/// # Errors
+/// Same as for [`find_pictures`].
+pub(super) fn find_files(
+    folder: &Path,
+    endings: &[&str],
+    wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<String>, RecordingError> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(RecordingError::io("list", folder))? {
         let Ok(name) = entry.map_err(RecordingError::io("list", folder))?.file_name().into_string() else { continue };
-        if split_name(&name).is_some_and(|(stem, _)| wanted(stem)) {
+        if split_known(&name, endings).is_some_and(|(stem, _)| wanted(stem)) {
             names.push(name);
         }
         if names.len() > MAX_ENTRIES {
@@ -38,9 +55,14 @@ pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Res
 
 /// Returns whether `folder` has a picture whose stem is `wanted`.
 pub(super) fn has_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool {
+    has_files(folder, &ENDINGS, wanted)
+}
+
+/// Returns whether `folder` has a file with one of these endings whose stem is `wanted`.
+pub(super) fn has_files(folder: &Path, endings: &[&str], wanted: impl Fn(&str) -> bool) -> bool {
     let mut names =
         fs::read_dir(folder).into_iter().flatten().filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    names.any(|name| split_name(&name).is_some_and(|(stem, _)| wanted(stem)))
+    names.any(|name| split_known(&name, endings).is_some_and(|(stem, _)| wanted(stem)))
 }
 
 /// Returns the names of the pictures whose stems consist of digits and `_`, in numeric order.

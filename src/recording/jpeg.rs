@@ -88,6 +88,11 @@ pub(super) fn segments(file: &[u8]) -> impl Iterator<Item = (u8, usize, &[u8])> 
     })
 }
 
+/// Returns the EXIF data of a JPEG, beginning with the TIFF header.
+pub(super) fn find_exif(file: &[u8]) -> Option<&[u8]> {
+    segments(file).find_map(|(marker, _, content)| content.strip_prefix(b"Exif\0\0").filter(|_| marker == 0xE1))
+}
+
 /// Returns whether the segments lead to the end marker (EOI), which a truncated file lacks.
 pub(super) fn is_complete(bytes: &[u8]) -> bool {
     find_end(bytes).is_some()

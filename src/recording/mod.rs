@@ -30,6 +30,7 @@ mod icc;
 mod jpeg;
 mod kitti;
 mod list;
+pub mod map_sequence;
 mod middlebury;
 mod options;
 mod pair;
@@ -122,6 +123,7 @@ pub struct Recording {
     disparity_count: Option<u32>,
     unpaired: Unpaired,
     has_times: bool,
+    are_photos: bool,
     is_chosen_by_size: bool,
 }
 
@@ -161,9 +163,10 @@ impl Recording {
 
         folder.maps_root = contents.maps_root;
         let sources = contents.frames.iter().map(|frame| &frame.color);
+        let read_size = if contents.are_photos { decode::read_upright_size } else { decode::read_size };
         let size = match &contents.container {
             Some(container) => container::read_first_size(container.as_ref(), dir, sources)?,
-            None => contents::read_first_size(&folder, sources)?,
+            None => contents::read_first_size(&folder, sources, read_size)?,
         };
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
@@ -182,6 +185,7 @@ impl Recording {
             disparity_count: contents.disparity_count,
             unpaired: contents.unpaired,
             has_times: contents.has_times,
+            are_photos: contents.are_photos,
             is_chosen_by_size: contents.is_chosen_by_size,
         })
     }
@@ -250,6 +254,12 @@ impl Recording {
         self.depth.is_some()
     }
 
+    /// Returns the file names of the colour pictures, without extension; empty for lines that name none.
+    pub fn picture_stems(&self) -> Vec<String> {
+        let stem = |frame: &Frame| frame.color.file.as_deref().ok()?.file_stem()?.to_str().map(str::to_owned);
+        self.frames.iter().map(|frame| stem(frame).unwrap_or_default()).collect()
+    }
+
     /// Returns the stereo geometry, if the frames have right pictures.
     pub fn stereo_geometry(&self) -> Option<&StereoGeometry> {
         self.stereo_geometry.as_ref()
@@ -277,9 +287,11 @@ impl Recording {
             return read.map_err(|fault| source.error(&self.folder.dir, fault));
         }
         let path = self.folder.locate(source)?;
-        decode::read_color(&path, Some(self.size), scratch, into)
-            .map(drop)
-            .map_err(|fault| source.error(&self.folder.dir, fault))
+        let read = match self.are_photos {
+            true => decode::read_upright(&path, self.size, scratch, into),
+            false => decode::read_color(&path, Some(self.size), scratch, into).map(drop),
+        };
+        read.map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture

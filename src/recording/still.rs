@@ -9,7 +9,6 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageFormat, RgbImage};
 
-use super::coded::EncodedPicture;
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
 use super::encode::Raster;
@@ -21,6 +20,7 @@ use super::unit::MapUnit;
 use super::{check_depth_scale, coded, depth_covers, encode, pfm, tiff_file};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
+use crate::names;
 use crate::optics::StereoRig;
 
 /// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
@@ -37,9 +37,17 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 /// # Errors
 /// Same as for [`read_color`].
 pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingError> {
+    read_with_metadata(path).map_err(RecordingError::picture(path))
+}
+
+/// Does the same as [`read_color`].
+pub(super) fn read_upright(path: &Path) -> Result<ColorImage, PictureFault> {
+    read_with_metadata(path).map(|(image, _)| image)
+}
+
+fn read_with_metadata(path: &Path) -> Result<(ColorImage, PhotoMetadata), PictureFault> {
     let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    let read = decode::read_color(path, None, &mut scratch, &mut image);
-    let mut metadata = read.map_err(RecordingError::picture(path))?;
+    let mut metadata = decode::read_color(path, None, &mut scratch, &mut image)?;
     drop(scratch);
 
     let orientation = metadata.take_orientation();
@@ -58,11 +66,8 @@ pub(super) fn turned(image: ColorImage, orientation: Orientation) -> ColorImage 
 
 /// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.
 pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
-    if coded::read_kind(path)? == file_kind::HEIC {
-        return None;
-    }
-    let mut memory = Vec::new();
-    Some(EncodedPicture::open(path, &mut memory).ok()?.metadata().take_orientation())
+    let is_converted = coded::read_kind(path)? == file_kind::HEIC;
+    coded::read_orientation(path).ok().filter(|_| !is_converted)
 }
 
 /// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.
@@ -179,17 +184,18 @@ pub(super) fn write_raster(
     write(path, encoded, &file, force)
 }
 
-/// A file format for pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PhotoFormat {
-    /// Lossless.
-    Png,
-    /// Lossy, and smaller; 8 bits without alpha.
-    Jpeg,
-    /// Lossless.
-    Tiff,
-    /// Lossless, and small; 8 bits.
-    WebP,
+names::named! {
+    /// A file format for pictures, by the extension of its files.
+    pub enum PhotoFormat default Png {
+        /// Lossless
+        Png = "png",
+        /// Lossy, and smaller; 8 bits without alpha
+        Jpeg = "jpg",
+        /// Lossless
+        Tiff = "tif",
+        /// Lossless, and small; 8 bits
+        WebP = "webp",
+    }
 }
 
 /// Returns the picture format for a file name.
@@ -222,6 +228,11 @@ pub fn is_photo(path: &Path) -> bool {
         Some(FileKind::Other(format)) => format != ImageFormat::Gif,
         kind => matches!(kind, Some(FileKind::Png | FileKind::Jpeg | file_kind::HEIC)),
     }
+}
+
+/// Returns whether a file is a GIF, by its first bytes.
+pub fn is_gif(path: &Path) -> bool {
+    coded::read_kind(path) == Some(FileKind::Other(ImageFormat::Gif))
 }
 
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown, as is depth beyond 65535 units; or

@@ -1,15 +1,20 @@
 //! External depth for a source, from another recording or a depth camera.
 
+use std::path::Path;
+
 use super::opened::recorded_depth_origin;
 use super::orientation::SourceTransform;
 use super::{
     DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera, video,
 };
-use crate::capture::FrameData;
+use crate::capture::{CaptureError, FrameData};
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::looped_recording::LoopedRecording;
+use crate::depth::map_sequence::SequenceDepth;
 use crate::recording::Recording;
+use crate::recording::map_sequence::{MapSequence, Pictured};
+use crate::video::VideoFile;
 
 /// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged. The
 /// source is transformed already.
@@ -37,6 +42,9 @@ pub(super) fn add_external_depth(
     if source.camera.info().frame_data == FrameData::Depth {
         return SourceError::usage_error("the source has its own depth: leave --depth out");
     }
+    if let Some(folder) = choice.map_folder() {
+        return add_map_sequence(source, folder, name, request);
+    }
     let mut first_depth = None;
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
@@ -62,6 +70,37 @@ pub(super) fn add_external_depth(
     // Such depth is of the camera's own pictures.
     let first_depth = first_depth.map(|map| transform.apply_to_map(map));
     Ok(Source { depth: Some(transform.apply_to_depth(external)), depth_from, first_depth, ..source })
+}
+
+/// Adds the depth maps in `folder`, one for each frame.
+///
+/// # Errors
+/// The source is no video or folder of pictures, has another number of frames, or no map can be read.
+fn add_map_sequence(
+    mut source: Source,
+    folder: &Path,
+    name: &SourceName,
+    request: &OpenRequest,
+) -> Result<Source, SourceError> {
+    let pictured = match name {
+        SourceName::Video(path) => Pictured::Frames(VideoFile::open(path).map_err(CaptureError::from)?.frames),
+        SourceName::Folder(_) => Pictured::Files(&source.findings.picture_stems),
+        SourceName::Stdin => Pictured::Frames(None),
+        _ => {
+            return SourceError::usage_error(format!(
+                "--depth {}: depth maps, one for each frame, belong to a video or a folder of pictures, and {name} is \
+                 neither",
+                folder.display()
+            ));
+        }
+    };
+    let (maps, notes) = MapSequence::open(folder, pictured, request.options.depth.of_photo())?;
+    let depth_from = maps.distances().into();
+    request.check_relative_depth(depth_from)?;
+    source.findings.notes.extend(notes);
+    let size = source.camera.info().size;
+    let first_depth = maps.read(0, size).ok().map(|file| file.map);
+    Ok(Source { depth: Some(Box::new(SequenceDepth(maps))), depth_from, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with scale and registration from the options.

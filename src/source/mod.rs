@@ -12,6 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod adaptation;
 pub mod calib;
 mod containers;
 pub mod devices;
@@ -31,9 +32,10 @@ mod stereo;
 mod suggestion;
 pub mod video;
 
+pub use adaptation::{adapt_look, reject_metric_look};
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
-pub use networks::{find_person, installed_networks, reject_metric_look};
+pub use networks::{find_person, installed_networks};
 use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, Orientation, PlateFile, SingleCameraDepth, Size};
 use orientation::SourceTransform;
@@ -49,7 +51,7 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
-use crate::look::{Effect, Look, SourceDepth, Strength};
+use crate::look::{Look, SourceDepth};
 use crate::optics::StereoRig;
 use crate::pipeline::{BlurSetup, Run};
 use crate::recording::{DepthUnit, Options as Reading, Recording, Scratch};
@@ -120,6 +122,10 @@ pub struct Findings {
     pub focus: Option<FocusRule>,
     /// The sharp original inside a photo, which is then the picture.
     pub original: Option<ColorImage>,
+    /// Whether the depth of a photo fits it already.
+    pub is_fitting: bool,
+    /// The file names of a recording's pictures, without extension.
+    pub picture_stems: Vec<String>,
 }
 
 /// Options for opening a source.
@@ -197,8 +203,12 @@ impl Source {
         let Options { frames, stereo, depth_choice, computing, .. } = request.options;
         name.check_frames(frames)?;
         request.check_effect()?;
-        if request.options.depth.depth_unit == Some(DepthUnit::Disparity) && !matches!(name, SourceName::Photo(_)) {
-            return Err(SourceError::Usage("--depth-unit disparity is only for the depth map of a photo".to_owned()));
+        if request.options.depth.depth_unit == Some(DepthUnit::Disparity)
+            && !matches!(name, SourceName::Photo(_))
+            && depth_choice.map_folder().is_none()
+        {
+            let what = "--depth-unit disparity is only for the depth map of a photo, and folders of depth maps";
+            return Err(SourceError::Usage(what.to_owned()));
         }
         let mut source = Opened::open(name, request)?;
         if stereo.side_by_side {
@@ -251,13 +261,16 @@ impl Source {
     /// Same as for [`adapt_look`].
     pub fn adapt_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
         let focus = self.findings.focus.filter(|_| look.focus == FocusRule::Auto).unwrap_or(look.focus);
-        adapt_look(&Look { focus, ..look.clone() }, &options.depth_choice, self.has_depth())
+        let (has_depth, is_relative, size) = (self.has_depth(), self.depth_from.is_relative(), self.camera.info().size);
+        adapt_look(&Look { focus, ..look.clone() }, &options.depth_choice, SourceDepth { has_depth, is_relative, size })
     }
 
-    /// Returns whether its depth is measured (not computed exactly), so that refinement improves it.
+    /// Returns whether its depth is measured (not computed exactly), so that refinement improves it. The depth of a photo
+    /// is that only if it does not fit the photo.
     pub fn is_measured(&self) -> bool {
         let is_made = matches!(self.depth_from, DepthOrigin::Networks | DepthOrigin::Plate);
-        self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
+        let is_exact = is_made || self.findings.is_fitting;
+        self.depth.is_some() && !is_exact && (self.rig.is_none() || REFINES_STEREO)
     }
 
     /// Creates a run of its frames ([`Run::with_blur`]) with this blur into `sink`, as fast as possible. `stop` ends the run.
@@ -324,29 +337,4 @@ impl OpenRequest<'_> {
             _ => false,
         }
     }
-}
-
-/// Adapts a look to a source with or without depth: without depth, `auto` becomes a uniform blur.
-///
-/// # Errors
-/// The look needs depth that the source lacks, or its lens needs a focus distance.
-pub fn adapt_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
-    let uses_depth = has_depth && *depth != DepthChoice::None;
-    if look.effect == Effect::Dof && !uses_depth {
-        return SourceError::usage_error(match has_depth {
-            true => "--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift",
-            false => "--effect dof needs depth, and the source has none: use --effect blur or tilt-shift",
-        });
-    }
-    if *depth == DepthChoice::Recorded && !has_depth {
-        return SourceError::usage_error("--depth recorded: the source has no depth");
-    }
-    let look = look.for_source(SourceDepth { has_depth: uses_depth, ..SourceDepth::default() });
-    let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
-    if matches!(look.strength, Strength::Lens(_)) && !has_distance {
-        return SourceError::usage_error(
-            "a lens without depth needs --focus METRES: its blur depends on the distance of focus",
-        );
-    }
-    Ok(look)
 }

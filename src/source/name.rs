@@ -53,7 +53,7 @@ pub enum SourceName {
     Demo,
     /// A recording: a folder, a file of its own such as `TAKE.mcap`, or a pattern such as `DIR/IMG_%04d.jpg`.
     Folder(PathBuf),
-    /// A PNG or JPEG.
+    /// A photo, of any kind of picture that is read.
     Photo(PathBuf),
     /// A video file.
     Video(PathBuf),
@@ -104,13 +104,13 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
         true => {
-            "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a camera, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
         false => {
-            "a photo (PNG or JPEG), a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
         }
     }
 }

@@ -13,19 +13,6 @@ use super::{DepthChoice, NetworkFile};
 /// Opened networks, and a short description of them.
 type Opened = (Box<dyn Companion>, String);
 
-/// Rejects a look that needs real distances; `who` is the subject of the message, a source of relative depth.
-///
-/// # Errors
-/// The look needs real distances.
-pub fn reject_metric_look(look: &Look, who: &str) -> Result<(), SourceError> {
-    match look.metric_setting() {
-        None => Ok(()),
-        Some(needs) => SourceError::usage_error(format!(
-            "{needs} needs distances, and {who} only the order of depth: use --focus auto or X,Y, and --blur"
-        )),
-    }
-}
-
 /// Opens the networks `chosen`, for a look.
 ///
 /// # Errors

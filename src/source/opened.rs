@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "camera")]
 use super::name;
-use super::{
-    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video,
-};
+use super::{DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
@@ -24,6 +22,7 @@ use crate::clock::Clock;
 use crate::compute::thread_pool::core_count;
 use crate::depth::DepthSource;
 use crate::depth::constant::ConstantDepth;
+use crate::depth::misalignment::Misalignment;
 use crate::depth::recorded::RecordedDepth;
 use crate::frame::DepthMap;
 #[cfg(feature = "camera")]
@@ -88,6 +87,7 @@ impl Opened {
                 let first_depth = request.read_first_depth(&recording);
                 let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
                 let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
+                let picture_stems = recording.picture_stems();
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
@@ -96,15 +96,18 @@ impl Opened {
                     depth,
                     depth_from,
                     first_depth,
-                    findings: Findings { notes, ..Findings::default() },
+                    findings: Findings { notes, picture_stems, ..Findings::default() },
                     pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
                     disparities,
                     ..without_depth(Box::new(camera))
                 })
             }
             SourceName::Photo(path) => {
-                let photo::ReadPhoto { color, depth, depth_from, findings } = photo::read_photo(path, request.options)?;
+                let photo::ReadPhoto { color, depth, depth_from, mut findings } =
+                    photo::read_photo(path, request.options)?;
                 request.check_relative_depth(depth_from)?;
+                let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
+                findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
                 let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
                 Ok(Self { depth, depth_from, findings, ..without_depth(Box::new(camera)) })
@@ -112,8 +115,7 @@ impl Opened {
             SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
             SourceName::Video(path) => {
                 // A seek would lose count of the frames.
-                let by_index = matches!(depth_choice, DepthChoice::Video(_));
-                Ok(without_depth(Box::new(video::open(path, frames, by_index)?)))
+                Ok(without_depth(Box::new(video::open(path, frames, depth_choice.counts_frames())?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {

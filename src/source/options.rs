@@ -22,6 +22,7 @@ use crate::look::number::{in_range_parser, parse_positive};
 #[cfg(feature = "clap")]
 use crate::names;
 use crate::recording::depth_file::{self, Fit};
+use crate::recording::map_sequence::is_map_folder;
 use crate::recording::{DepthUnit, is_recording_file};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
@@ -126,6 +127,7 @@ impl Depth {
             scale: self.depth_scale,
             invalid: Some(f32::from(self.depth_invalid)),
             fit: self.depth_fit,
+            range: None,
         }
     }
 
@@ -184,7 +186,7 @@ pub enum DepthChoice {
     Stereo,
     /// None, for effects that need none.
     None,
-    /// The depth of the recording in this folder or file.
+    /// The depth of the recording in this folder or file, or the depth maps in this folder, one for each frame.
     Folder(PathBuf),
     /// A video of relative depth, frame by frame.
     Video(PathBuf),
@@ -200,6 +202,19 @@ impl DepthChoice {
     /// Returns whether the depth is not the source's own.
     pub fn is_external(&self) -> bool {
         matches!(self, Self::Folder(_) | Self::Video(_) | Self::Device(_) | Self::SingleCamera(_) | Self::Defocus)
+    }
+
+    /// Returns whether it is a file for each frame, or a frame of a video: frames are then counted.
+    pub fn counts_frames(&self) -> bool {
+        matches!(self, Self::Video(_)) || self.map_folder().is_some()
+    }
+
+    /// Returns the folder of depth maps that it names, unless that is a recording.
+    pub fn map_folder(&self) -> Option<&Path> {
+        match self {
+            Self::Folder(folder) => Some(&**folder).filter(|folder| is_map_folder(folder)),
+            _ => None,
+        }
     }
 
     /// Returns a hint for a message if a text resembles a keyword.

@@ -8,14 +8,12 @@ use crate::depth::FrameInput;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
-use crate::recording::depth_file::{self, DepthFile, DepthInside, Distances};
+use crate::recording::depth_file::{self, DepthFile, DepthInside, Distances, EXTENSIONS};
 use crate::recording::embedded::Focus;
 use crate::recording::{snapshot, still};
 
 /// Suffixes of depth files, after the photo's stem and before [`EXTENSIONS`].
 const DEPTH: [&str; 2] = ["-depth", ".depth"];
-/// Extensions of depth files. The first is that of snapshots.
-const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp"];
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
@@ -42,7 +40,7 @@ pub struct PhotoDepth {
     pub map: DepthMap,
     /// Its origin.
     pub from: DepthOrigin,
-    /// Whether refinement improves it.
+    /// Whether it comes from a file, not from a network.
     pub measured: bool,
     /// A short description of its source.
     pub by: String,
@@ -64,8 +62,8 @@ pub fn read_default_depth(
     look: &Look,
 ) -> Result<(Option<PhotoDepth>, Vec<String>), SourceError> {
     let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
-    let measured = source.is_measured();
-    let Findings { notes, depth_by, focus, original } = std::mem::take(&mut source.findings);
+    let measured = !source.depth_from.is_replaceable();
+    let Findings { notes, depth_by, focus, original, .. } = std::mem::take(&mut source.findings);
     let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok((None, notes)) };
     let mut map = DepthMap::default();
     let color = original.as_ref().unwrap_or(color);
@@ -134,6 +132,9 @@ impl ReadPhoto {
         }
         findings.focus = focus.map(|focus| match focus {
             Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },
+            Focus::Distance(distance) if self.depth_from.is_relative() => {
+                FocusRule::Relative((1.0 - DepthMap::SUBJECT_M / distance).clamp(0.0, 1.0))
+            }
             Focus::Distance(distance) => FocusRule::Metres(distance),
         });
         if let Some(FocusRule::Point { x, y }) = findings.focus {

@@ -10,11 +10,13 @@ use crate::capture::video::Video;
 use crate::depth::DepthError;
 use crate::depth::video::VideoDepth;
 use crate::files::input;
+use crate::recording::depth_file::has_same_view;
+use crate::recording::still;
 use crate::sink::Sound;
 use crate::video::{VideoError, VideoFile};
 
 /// Beginnings of video files: an offset, and the bytes there.
-const SIGNATURES: [(usize, &[u8]); 15] = [
+const SIGNATURES: [(usize, &[u8]); 13] = [
     // ISO 14496-12 and QuickTime; pictures in this container are told apart by their brand.
     (4, b"ftyp"),
     (4, b"moov"),
@@ -24,8 +26,6 @@ const SIGNATURES: [(usize, &[u8]); 15] = [
     // Matroska and WebM.
     (0, &[0x1a, 0x45, 0xdf, 0xa3]),
     (8, b"AVI "),
-    (0, b"GIF87a"),
-    (0, b"GIF89a"),
     (0, b"YUV4MPEG2"),
     (0, b"OggS"),
     (0, b"FLV\x01"),
@@ -48,7 +48,8 @@ pub fn is_video(path: &Path) -> bool {
     // An unreadable file is reported when it is opened.
     let _ = input::open(path).and_then(|file| file.take(256).read_to_end(&mut first));
     let has = |at: usize, bytes: &[u8]| first.get(at..).is_some_and(|rest| rest.starts_with(bytes));
-    let is_known = SIGNATURES.iter().any(|&(at, bytes)| has(at, bytes) && (at != 188 || has(0, b"G")));
+    let is_known =
+        still::is_gif(path) || SIGNATURES.iter().any(|&(at, bytes)| has(at, bytes) && (at != 188 || has(0, b"G")));
     let is_picture = has(4, b"ftyp") && PICTURE_BRANDS.iter().any(|brand| has(8, brand));
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     let is_named = extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()));
@@ -75,8 +76,7 @@ pub(super) fn parse(path: &Path) -> Option<Result<SourceName, SourceError>> {
 pub(super) fn open(path: &Path, frames: &Frames, by_index: bool) -> Result<Video, SourceError> {
     let file = VideoFile::open(path).map_err(CaptureError::from)?;
     let size_px = frames.size.map_or(file.size_px, |size| (size.width, size.height));
-    let skew = |(width, height): (u32, u32)| f64::from(width) / f64::from(height);
-    if (skew(size_px) / skew(file.size_px) - 1.0).abs() > MAX_DISTORTION {
+    if !has_same_view(size_px, file.size_px) {
         let ((width, height), (from_width, from_height)) = (size_px, file.size_px);
         tracing::warn!("--size {width}x{height} distorts the pictures, which are {from_width}x{from_height}");
     }
@@ -129,9 +129,6 @@ pub(super) fn open_depth(
     tracing::info!("{}: relative depth, {near} is near; --depth-invert takes the other end", file.display());
     Ok(VideoDepth::open(depth, color_px, options.depth_invert).map_err(DepthError::from)?)
 }
-
-/// Largest change of the aspect ratio that is not mentioned: that of rounding to even sides.
-const MAX_DISTORTION: f64 = 0.02;
 
 /// Returns the part of a recording or video to play.
 pub(super) fn play_range(frames: &Frames) -> PlayRange {

@@ -1,18 +1,19 @@
 //! Decodes the pictures of a video file in a child process.
 
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::ErrorKind;
 use std::os::fd::OwnedFd;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
 use super::command::{FFMPEG, base_command, file_url, frame_timing_option};
+use super::completeness::{Expected, is_cut_gif, is_loss};
 use super::process::{Process, Watchdog};
 use super::{VideoError, VideoFile};
 use crate::color::YcbcrMatrix;
-use crate::files::input;
 use crate::files::pipe_reader::{Filled, PipeReader};
 use crate::layout::MAX_SIDE_PX;
 
@@ -21,9 +22,6 @@ const MAX_MESSAGES: usize = 2;
 
 /// ffmpeg states a picture's time before the picture itself, on another pipe.
 const TIME_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// The last byte of a GIF (section 27 of GIF89a), which ffmpeg does not miss.
-const GIF_TRAILER: u8 = 0x3b;
 
 /// The form of decoded pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +88,12 @@ pub struct Decoder {
     /// Since when nothing has arrived.
     idle_since: Option<Instant>,
     frames: u64,
+    /// Time of the last picture in the file, in nanoseconds.
+    last_ns: Option<i64>,
+    /// Whether ffmpeg has said that something is lost.
+    has_loss: Arc<AtomicBool>,
+    expected: Expected,
+    remark: Option<String>,
 }
 
 impl Decoder {
@@ -104,7 +108,12 @@ impl Decoder {
         }
         let (to_times, times_ns) = mpsc::channel();
         let mut messages = 0;
+        let has_loss = Arc::new(AtomicBool::new(false));
+        let lost = Arc::clone(&has_loss);
         let log = move |line: &str| {
+            if is_loss(line) {
+                lost.store(true, Ordering::Relaxed);
+            }
             if let Some(time_ns) = parse_time(line) {
                 // The decoder may have been dropped.
                 let _ = to_times.send(time_ns);
@@ -128,6 +137,10 @@ impl Decoder {
             filled: 0,
             idle_since: None,
             frames: 0,
+            last_ns: None,
+            has_loss,
+            expected: Expected::of(file, conversion),
+            remark: None,
         })
     }
 
@@ -154,16 +167,33 @@ impl Decoder {
             Filled::Whole => {
                 (self.filled, self.frames) = (0, self.frames + 1);
                 let time_ns = self.times_ns.recv_timeout(TIME_TIMEOUT).ok().flatten();
-                Ok(Decoded::Picture(time_ns.map(|time_ns| time_ns.saturating_add(self.ahead_ns))))
+                let time_ns = time_ns.map(|time_ns| time_ns.saturating_add(self.ahead_ns));
+                self.last_ns = time_ns;
+                Ok(Decoded::Picture(time_ns))
             }
         }
+    }
+
+    /// Takes what ffmpeg called an error, though nothing is missing: for a warning after the end.
+    pub fn take_remark(&mut self) -> Option<String> {
+        let (remark, path) = (self.remark.take()?, self.path.display());
+        Some(format!("{path}: ffmpeg says \"{remark}\", but all of its {} pictures are there", self.frames))
     }
 
     /// Waits for the end of ffmpeg, which has closed its output, and checks that the file was whole.
     fn finish(&mut self) -> Result<(), VideoError> {
         let ended = self.process.wait().map_err(VideoError::io(&self.path))?;
         let Some(status) = ended.status else { return Err(VideoError::Hung { path: self.path.clone() }) };
+        // Standard error is closed by now, so that all losses are known.
+        let is_whole = status.success()
+            && self.filled == 0
+            && !self.has_loss.load(Ordering::Relaxed)
+            && self.expected.is_reached(self.frames, self.last_ns);
         let what = match ended.stderr {
+            messages if !messages.is_empty() && is_whole => {
+                self.remark = Some(messages);
+                return Ok(());
+            }
             messages if !messages.is_empty() => messages,
             _ if !status.success() => format!("ffmpeg ended with {status}"),
             _ if self.filled > 0 => "the last picture is incomplete".to_owned(),
@@ -216,18 +246,6 @@ fn parse_message(line: &str) -> Option<&str> {
         let (context, message) = line.split_once(level)?;
         (context.is_empty() || context.starts_with('[') && context.trim_end().ends_with(']')).then_some(message)
     })
-}
-
-/// Returns whether a file is a GIF without its last byte.
-fn is_cut_gif(path: &Path) -> bool {
-    let read = || {
-        let (mut file, mut head, mut last) = (input::open(path)?, [0; 4], [0]);
-        file.read_exact(&mut head)?;
-        file.seek(SeekFrom::End(-1))?;
-        file.read_exact(&mut last)?;
-        io::Result::Ok((head, last))
-    };
-    read().is_ok_and(|(head, last)| head == *b"GIF8" && last != [GIF_TRAILER])
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 #[doc(hidden)]
 pub mod command;
+mod completeness;
 mod decoder;
 mod encryption;
 mod error;

@@ -7,7 +7,7 @@ use crate::settings::{changes, unused};
 use bokehcam::control::{self, Answer, Claim, ControlError, Name};
 use bokehcam::controller::{Rules, SourceFacts};
 use bokehcam::depth::backdrop::Background;
-use bokehcam::look::{Look, Patch, Strength};
+use bokehcam::look::{Look, Patch, SourceDepth, Strength};
 use bokehcam::source::{self, DepthOrigin};
 
 /// Claims a name for a run. Without a folder for sockets the run continues, and the inner error is the line to log
@@ -70,21 +70,23 @@ fn apply_checked_patch(
         )));
     }
     let was_transparent = look.background == Background::Transparent;
-    let look = source::adapt_look(&patch.apply_to(look)?, &facts.depth_choice, facts.has_depth)?;
+    let look = patch.apply_to(look)?;
     if look.background == Background::Transparent && !was_transparent {
         return Err(CliError::Usage(
             "--behind transparent cannot be set while it runs, as outputs are opened for it: start a `stream` with it"
                 .to_owned(),
         ));
     }
-    let uses_depth = look.effect.follows_depth();
     match facts.depth_from {
-        DepthOrigin::Networks | DepthOrigin::Plate if uses_depth => {
-            source::reject_metric_look(&look, "one camera gives")?
-        }
-        DepthOrigin::Relative if uses_depth => source::reject_metric_look(&look, source::INVERSE_DEPTH_GIVES)?,
+        _ if !(facts.has_depth && look.effect.follows_depth()) => {}
+        DepthOrigin::Networks | DepthOrigin::Plate => source::reject_metric_look(&look, "one camera gives")?,
+        DepthOrigin::Relative => source::reject_metric_look(&look, source::INVERSE_DEPTH_GIVES)?,
         _ => {}
     }
+    let (has_depth, is_relative) = (facts.has_depth, facts.depth_from.is_relative());
+    let known = SourceDepth { has_depth, is_relative, size: facts.size };
+    let look = source::adapt_look(&look, &facts.depth_choice, known)?;
+    let uses_depth = look.effect.follows_depth();
     let run = unused::RunFacts {
         source: unused::FrameOrigin::Source(facts.kind),
         depth: if facts.has_depth { facts.depth_from } else { DepthOrigin::Nothing },

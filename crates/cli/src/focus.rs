@@ -6,6 +6,13 @@ use bokehcam::frame::DepthMap;
 use bokehcam::look::{CocRule, Look};
 use bokehcam::optics::{CocField, DepthCoc};
 
+/// Says that the number of a focus is `taken` as a place in relative depth.
+pub fn note_place(given: &Look, taken: &Look) {
+    if let (FocusRule::Metres(_) | FocusRule::Relative(_), FocusRule::Relative(place)) = (given.focus, taken.focus) {
+        log::note(&format!("--focus {place}: a place in relative depth, from 0 (nearest) to 1 (farthest)"));
+    }
+}
+
 /// Fraction of a map that must be blurred on one side of the focal plane to count as all of it: the rest is noise.
 const MIN_BLURRED_FRACTION: f32 = 0.99;
 /// CoC radius up to which a pixel is sharp, in pixels.

@@ -18,8 +18,8 @@ from .work import HIDDEN, OURS, REPORTS, Job, Unit, finished, located, read_repo
 
 PICTURES = (".png", ".jpg", ".jpeg")
 DEPTH_MAPS = (".png", ".pfm")
-# The program's name for the depth map next to a photo.
-DEPTH_SUFFIX = "-depth"
+# The program's names for the depth map next to a photo, which it finds itself.
+DEPTH_SUFFIXES = ("-depth", ".depth")
 # Formats that each command can write; the first is the default.
 FORMATS = {"stream": ("mp4", "mkv", "webm", "y4m", "png"), "render": ("png", "jpg")}
 # Flags of the program that the farm sets itself, or that make no sense with it.
@@ -35,7 +35,7 @@ OWN_FLAGS = {
         "--config",
         "--log-format",
     ),
-    "render": ("--out", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
+    "render": ("--out", "--out-format", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
 }
 MAX_NAME_BYTES = 255
 
@@ -146,7 +146,7 @@ def expanded(command: str, source: Path) -> list[Path]:
     pictures = [
         entry
         for entry in sorted(path.iterdir())
-        if entry.suffix.lower() in PICTURES and not entry.name.startswith(".") and not entry.stem.endswith(DEPTH_SUFFIX)
+        if entry.suffix.lower() in PICTURES and not entry.name.startswith(".") and not entry.stem.endswith(DEPTH_SUFFIXES)
     ]
     if not pictures:
         raise UsageError(f"{source}: it contains no pictures (PNG or JPEG); recordings are for `stream`")
@@ -154,16 +154,18 @@ def expanded(command: str, source: Path) -> list[Path]:
 
 
 def depth_of(picture: Path, folder: str | None) -> tuple[str, ...]:
-    """Returns the arguments for a picture's depth map: of the same name in `folder`, else NAME-depth next to it, if any."""
-    if folder is not None:
-        there = [Path(os.path.abspath(folder)) / f"{picture.stem}{end}" for end in DEPTH_MAPS]
-        found = next((path for path in there if path.exists()), None)
-        if found is None:
-            raise UsageError(f"{picture}: its depth map {picture.stem}.png or .pfm is not in {folder}")
-        return "--depth-map", str(found)
-    beside = [picture.with_name(f"{picture.stem}{DEPTH_SUFFIX}{end}") for end in DEPTH_MAPS]
-    found = next((path for path in beside if path.exists()), None)
-    return ("--depth-map", str(found)) if found else ()
+    """Returns the arguments for a picture's depth map: the one of its name in `folder`, if there is a folder."""
+    if folder is None:
+        return ()
+    # As the program finds it there.
+    names = [[f"{picture.stem}{suffix}{end}" for end in DEPTH_MAPS] for suffix in (*DEPTH_SUFFIXES, "")]
+    there = [[path for name in same if (path := Path(os.path.abspath(folder)) / name).exists()] for same in names]
+    found = next((paths for paths in there if paths), [])
+    if not found:
+        raise UsageError(f"{picture}: its depth map {picture.stem}.png or .pfm is not in {folder}")
+    if len(found) > 1:
+        raise UsageError(f"{picture}: {found[0]} and {found[1]} are both its depth map: remove one")
+    return "--depth-map", str(found[0])
 
 
 def to_do(job: Job, planned: list[Unit]) -> list[Unit]:

@@ -34,6 +34,9 @@ HIDDEN = ".bokehcam-farm"
 # Folders of attempts (JOB-NUMBER) and settings of jobs (JOB.toml), where JOB is its time of start.
 OURS = re.compile(r"([0-9a-f]{16})(-[0-9a-f]{12}|\.toml)")
 
+# What the program adds to a message on several pictures.
+OF_MANY = re.compile(r" \(\d+ pictures, the first is .*\)$")
+
 # Execs the program, which dies with its parent (PR_SET_PDEATHSIG, kept by exec) and has the signals blocked that would
 # end it early with a seemingly complete result. A separate process, because only a single-threaded process may safely
 # run Python between fork and exec.
@@ -124,7 +127,8 @@ def perform(job: Job, units: list[Unit], node: str = "") -> Outcome:
     program, unfit = fit(job)
     if unfit:
         return Outcome(host, node, unfit=unfit)
-    return Outcome(host, node, tuple(make(job, unit, program) for unit in units))
+    results = make_pictures(job, units, program) if job.command == "render" else [make(job, unit, program) for unit in units]
+    return Outcome(host, node, tuple(results))
 
 
 def fit(job: Job) -> tuple[str, str]:
@@ -170,6 +174,50 @@ def make(job: Job, unit: Unit, program: str) -> Result:
         shutil.rmtree(place, ignore_errors=True)
 
 
+def make_pictures(job: Job, units: list[Unit], program: str) -> list[Result]:
+    """Makes pictures, unless they exist, in one run of the program. Those without a result or an error of their own, as
+    after a crash, are made alone."""
+    left = [unit for unit in units if not finished(job, unit)]
+    made: dict[Unit, Result] = {}
+    if len(left) > 1:
+        place = job.hidden / f"{job.id}-{secrets.token_hex(6)}"
+        try:
+            place.mkdir()
+            made = attempt_pictures(job, left, program, place)
+        except OSError:
+            # It concerns each picture, and is reported with each.
+            pass
+        finally:
+            shutil.rmtree(place, ignore_errors=True)
+    return [made.get(unit) or make(job, unit, program) for unit in units]
+
+
+def attempt_pictures(job: Job, units: list[Unit], program: str, place: Path) -> dict[Unit, Result]:
+    """Makes pictures in `place` in one run, and publishes them; returns those that are there or have an error."""
+    started = time.monotonic()
+    _, said = run(job, program, arguments_of_many(job, units, place))
+    parts = {unit: part for unit in units if (part := place / unit.output).exists()}
+    elapsed_s = (time.monotonic() - started) / max(len(parts), 1)
+
+    def texts(level: str, unit: Unit) -> list[str]:
+        words = [in_words(job, place, text) for at, text in said if at == level]
+        return [OF_MANY.sub("", text) for text in words if named(text, units) is unit]
+
+    made = {}
+    for unit in units:
+        warnings = tuple(texts("WARN", unit))
+        if part := parts.get(unit):
+            made[unit] = settle(job, unit, part, place / "report.json", {"elapsed_s": elapsed_s}, warnings)
+        elif errors := texts("ERROR", unit):
+            made[unit] = Result(unit, errors[-1], warnings=warnings)
+    return made
+
+
+def named(text: str, units: list[Unit]) -> Unit | None:
+    """Returns the unit whose source a message names; the longest name, as one may begin with another."""
+    return max((unit for unit in units if unit.source in text), key=lambda unit: len(unit.source), default=None)
+
+
 def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
     """Makes one result in `place`, and publishes it."""
     part, report_part = place / unit.output, place / "report.json"
@@ -180,6 +228,11 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
         cause = in_words(job, place, cause_of(code, said))
         return Result(unit, cause, refused=code == 2, warnings=warnings)
     report: Report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
+    return settle(job, unit, part, report_part, report, warnings)
+
+
+def settle(job: Job, unit: Unit, part: Path, report_part: Path, report: Report, warnings: tuple[str, ...]) -> Result:
+    """Publishes the finished result `part` with its report, which is written through the file `report_part`."""
     made = {"output": measure(part), "version": job.version, "host": socket.gethostname()}
     report["farm"] = {**job.asked(unit), **made}
     if not complete(report, job.command):
@@ -206,6 +259,14 @@ def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
     # In real time, frames may be dropped, and a second run would give another result.
     to = f"{part}/" if job.format == "png" else str(part)
     return [*common, "--to", to, "--report", str(report), "--pace", "asap"]
+
+
+def arguments_of_many(job: Job, units: list[Unit], place: Path) -> list[str]:
+    """Returns the program's arguments for pictures, whose depth maps are in one folder, if they are named."""
+    folders = {os.path.dirname(unit.extra[1]) for unit in units if unit.extra}
+    maps = [argument for folder in folders for argument in ("--depth-map", folder)]
+    own = ["--log-format", "json", "--config", str(job.settings_file), job.command]
+    return [*own, *(unit.source for unit in units), *job.flags, *maps, "--out", f"{place}/", "--out-format", job.format]
 
 
 def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, str]]]:

@@ -22,6 +22,8 @@ use crate::frame::DepthMap;
 pub enum FocusRule {
     /// A distance in metres, > 0.
     Metres(f32),
+    /// A place in relative depth, linear in inverse depth: 0 is the nearest, 1 the farthest.
+    Relative(f32),
     /// The person that a mask shows; without one, the nearest large subject.
     Auto,
     /// A point, as fractions of width and height (0 to 1).
@@ -52,11 +54,32 @@ impl FromStr for FocusRule {
             Some(at) => point(at).map(|(x, y)| Self::Track { x, y }),
             None if text == "auto" => Some(Self::Auto),
             None if text.contains(',') => point(text).map(|(x, y)| Self::Point { x, y }),
-            None => within(text, f32::MAX).filter(|&metres| DepthMap::is_known(metres)).map(Self::Metres),
+            None => within(text, f32::MAX).and_then(Self::from_number),
         };
-        rule.ok_or_else(|| {
-            "use METRES above 0, auto, X,Y as fractions of width and height (0 to 1), or track:X,Y".to_string()
-        })
+        rule.ok_or_else(|| format!("use {ACCEPTED}"))
+    }
+}
+
+/// What [`FocusRule`] is parsed from, for messages.
+const ACCEPTED: &str = "METRES above 0 (in relative depth a place from 0, the nearest, to 1), auto, X,Y as fractions of \
+                        width and height (0 to 1), or track:X,Y";
+
+impl FocusRule {
+    /// Reads a number, which [`FocusRule::for_depth`] gives its meaning; `None` if it has none.
+    fn from_number(number: f32) -> Option<Self> {
+        // There are no 0 m.
+        let distance = || Some(number).filter(|&metres| DepthMap::is_known(metres)).map(Self::Metres);
+        if number == 0.0 { Some(Self::Relative(0.0)) } else { distance() }
+    }
+
+    /// Returns the rule for depth in metres, or for relative depth, where a number from 0 to 1 is a place. `None` if the
+    /// number has no meaning there.
+    pub fn for_depth(self, is_relative: bool) -> Option<Self> {
+        match self {
+            Self::Metres(place) if is_relative => (place <= 1.0).then_some(Self::Relative(place)),
+            Self::Relative(place) if !is_relative => (place > 0.0).then_some(Self::Metres(place)),
+            rule => Some(rule),
+        }
     }
 }
 
@@ -64,7 +87,7 @@ impl fmt::Display for FocusRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Auto => f.write_str("auto"),
-            Self::Metres(metres) => write!(f, "{metres}"),
+            Self::Metres(number) | Self::Relative(number) => write!(f, "{number}"),
             Self::Point { x, y } => write!(f, "{x},{y}"),
             Self::Track { x, y } => write!(f, "{TRACK}{x},{y}"),
         }
@@ -119,6 +142,7 @@ impl Focus {
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
+            FocusRule::Relative(place) => Some(DepthMap::relative_to_metres(1.0 - place)),
             FocusRule::Auto if map.subject_m.is_some() => map.subject_m,
             FocusRule::Auto => {
                 let Self { subject, hysteresis, .. } = self;

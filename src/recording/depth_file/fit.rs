@@ -19,8 +19,8 @@ names::named! {
 /// 32, cameras to those of their sensors.
 const MAX_SKEW: f64 = 0.02;
 
-/// Returns whether a map has the aspect ratio of its picture, within 2 % or one pixel.
-fn has_same_view(depth: (u32, u32), color: (u32, u32)) -> bool {
+/// Returns whether a map, or a scaled picture, has the aspect ratio of its picture, within 2 % or one pixel.
+pub fn has_same_view(depth: (u32, u32), color: (u32, u32)) -> bool {
     let [depth_width, depth_height, width, height] = [depth.0, depth.1, color.0, color.1].map(f64::from);
     // Compare by cross-multiplication: one pixel of the map changes the products by at most the longer colour side.
     let (a, b) = (depth_width * height, depth_height * width);

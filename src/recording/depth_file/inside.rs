@@ -15,7 +15,8 @@ use crate::recording::{PhotoMetadata, RecordingError, decode, still};
 /// A photo with its own depth.
 #[derive(Debug)]
 pub struct DepthInside {
-    /// Its depth; distances without a unit are [`Distances::Relative`], but their ratios are those of the scene.
+    /// Its depth; distances without a unit are [`Distances::Relative`], but their ratios are those of the scene, and the
+    /// nearest (but for 1 %) is [`DepthMap::SUBJECT_M`].
     pub depth: DepthFile,
     /// The picture before the phone's own blur, upright, if it is there.
     pub original: Option<ColorImage>,
@@ -55,6 +56,12 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
     let distances = if is_metric { Distances::Metres } else { Distances::Relative };
     let mut file = DepthFile { map, distances, notes: Vec::new() };
     meaning::check_usable(&file.map, false).map_err(|fault| broken("the map", &fault))?;
+    let inverse =
+        file.map.metres.iter().map(|&metres| DepthMap::inverse_depth(metres)).filter(|&inverse| inverse > 0.0);
+    // Relative depth begins with its nearest point.
+    let scale =
+        meaning::nearest(inverse.collect()).filter(|_| !is_metric).map_or(1.0, |near| near * DepthMap::SUBJECT_M);
+    file.map.metres.iter_mut().for_each(|metres| *metres *= scale);
 
     let original = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation) {
         Ok(original) => Some(original),
@@ -67,7 +74,7 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
     fit::fit_to(&mut file, None, color).map_err(|fault| broken("the map", &fault))?;
     let focus = focus.map(|focus| match focus {
         Focus::Point { x, y } => turn_point(x, y, orientation),
-        Focus::Distance(distance) => Focus::Distance(distance),
+        Focus::Distance(distance) => Focus::Distance(distance * scale),
     });
     Ok(Some(DepthInside { depth: file, original, focus, kind }))
 }

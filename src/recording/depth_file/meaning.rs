@@ -94,11 +94,10 @@ impl Meaning {
 
     /// Converts the numbers to depth.
     pub fn into_depth(self, values: Values, options: &Options) -> DepthFile {
+        let range = options.range.or_else(|| self.range_of(&values.numbers, options));
+        let is_known = self.known(options);
         let Self { quantity, distances, mut notes } = self;
         let (width, height) = values.size;
-        // In inverse depth 0 is the farthest, unless it is said to be unknown.
-        let invalid = options.invalid.filter(|&invalid| quantity != Quantity::Inverse || invalid != 0.0);
-        let is_valid = |number: f32| Some(number) != invalid;
         let mut numbers = values.numbers;
         let map = match quantity {
             Quantity::Depth { per_m } => {
@@ -107,13 +106,12 @@ impl Meaning {
                     let far = if *number > 0.0 { DepthMap::MAX_M } else { 0.0 };
                     let metres = *number / per_m;
                     let metres = if metres <= DepthMap::MAX_M { metres } else { far };
-                    *number = if is_valid(*number) && DepthMap::is_known(metres) { metres } else { 0.0 };
+                    *number = if is_known(*number) && DepthMap::is_known(metres) { metres } else { 0.0 };
                 }
                 DepthMap { width, height, metres: numbers, ..DepthMap::default() }
             }
             Quantity::Inverse => {
-                let is_known = |number: f32| number.is_finite() && is_valid(number);
-                let (low, high) = range_of(numbers.iter().copied().filter(|&number| is_known(number)));
+                let (low, high) = range.unwrap_or_default();
                 let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
                 for number in &mut numbers {
                     let near = (*number - low) * scale;
@@ -123,9 +121,11 @@ impl Meaning {
                 DepthMap { width, height, metres: numbers, ..DepthMap::default() }
             }
             Quantity::Disparity { per_px, rig } => {
-                let rig = rig.unwrap_or_else(|| StereoRig::default_for_width(width));
-                numbers.iter_mut().for_each(|number| *number = if is_valid(*number) { *number / per_px } else { 0.0 });
-                DisparityMap { width, height, px: numbers }.to_depth_map(|px| rig.depth_m(px))
+                // Without a scale, the nearest is where relative depth has it.
+                let nearest = range.map_or(1.0, |(_, nearest)| nearest) / per_px;
+                let depth_m = |px| rig.map_or(DepthMap::SUBJECT_M * nearest / px, |rig| rig.depth_m(px));
+                numbers.iter_mut().for_each(|number| *number = if is_known(*number) { *number / per_px } else { 0.0 });
+                DisparityMap { width, height, px: numbers }.to_depth_map(depth_m)
             }
         };
         let unknown = map.metres.iter().filter(|&&metres| metres == 0.0).count() as f32 / map.metres.len() as f32;
@@ -134,6 +134,34 @@ impl Meaning {
         }
         DepthFile { map, distances, notes }
     }
+
+    /// Returns the test of whether a number is known.
+    fn known(&self, options: &Options) -> impl Fn(f32) -> bool + use<> {
+        let is_inverse = self.quantity == Quantity::Inverse;
+        // In inverse depth 0 is the farthest, unless it is said to be unknown.
+        let invalid = options.invalid.filter(|&invalid| !is_inverse || invalid != 0.0);
+        move |number| Some(number) != invalid && (number.is_finite() || !is_inverse)
+    }
+
+    /// Returns the numbers of relative depth between which it lies; `None` for depth in metres.
+    pub fn range_of(&self, numbers: &[f32], options: &Options) -> Option<(f32, f32)> {
+        let is_known = self.known(options);
+        let known = || numbers.iter().copied().filter(|&number| is_known(number));
+        match self.quantity {
+            Quantity::Inverse => Some(range_of(known())),
+            Quantity::Disparity { rig: None, .. } => {
+                nearest(known().filter(|&number| DepthMap::is_known(number)).collect()).map(|nearest| (0.0, nearest))
+            }
+            Quantity::Depth { .. } | Quantity::Disparity { .. } => None,
+        }
+    }
+}
+
+/// Returns the inverse depth that counts as the nearest, of known ones: a few outliers are nearer.
+pub(super) fn nearest(mut inverse: Vec<f32>) -> Option<f32> {
+    const OUTLIERS: f32 = 0.01;
+    let at = (OUTLIERS * inverse.len() as f32) as usize;
+    (!inverse.is_empty()).then(|| *inverse.select_nth_unstable_by(at, |a, b| b.total_cmp(a)).1)
 }
 
 /// Returns what is wrong with numbers that would be taken as distances, as nothing else is stated.

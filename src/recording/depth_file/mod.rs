@@ -1,6 +1,7 @@
 //! Depth maps of single pictures, as files of any tool or inside photos: reads the numbers, decides what they mean, and
 //! fits the map to its picture.
 
+mod color_map;
 mod exr;
 mod fit;
 mod inside;
@@ -12,17 +13,22 @@ mod values;
 
 use std::path::Path;
 
-pub use fit::{Fit, covers, describe_stretch};
+pub use fit::{Fit, covers, describe_stretch, has_same_view};
 pub use inside::{DepthInside, read_inside};
 pub use unit::DepthUnit;
 
 use super::RecordingError;
 use super::fault::PictureFault;
 use crate::frame::{DepthMap, DisparityMap};
+use color_map::ColorMapped;
 use meaning::Meaning;
+use values::Values;
 
 /// File formats of depth maps, for messages.
 pub(super) const FORMATS: &str = "PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR";
+
+/// Extensions of the files of depth maps. The first is that of snapshots.
+pub const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp"];
 
 /// How to read a depth map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,6 +43,9 @@ pub struct Options {
     pub invalid: Option<f32>,
     /// How a map of another aspect ratio is fitted to its picture.
     pub fit: Option<Fit>,
+    /// The numbers of relative depth that are the farthest and the nearest (or the other way round, with `invert`), for
+    /// maps of one sequence; `None` is the range of the map itself.
+    pub range: Option<(f32, f32)>,
 }
 
 /// What the distances of a map are worth.
@@ -76,9 +85,10 @@ pub struct DepthFile {
 /// nothing in it is usable; it has another aspect ratio, and `options` do not say how it fits.
 pub fn read(path: &Path, options: &Options, color: (u32, u32)) -> Result<DepthFile, RecordingError> {
     let read = || -> Result<DepthFile, PictureFault> {
-        let values = values::read(path)?;
+        let (values, note) = read_values(path, options)?;
         let is_stated = values.stated.is_some();
         let mut file = Meaning::decide(&values, options)?.into_depth(values, options);
+        file.notes.splice(..0, note);
         meaning::check_usable(&file.map, is_stated)?;
         fit::fit_to(&mut file, options.fit, color)?;
         Ok(file)
@@ -88,8 +98,35 @@ pub fn read(path: &Path, options: &Options, color: (u32, u32)) -> Result<DepthFi
 
 /// Does the same as [`read`] in the size of the file, which may be of one depth, or of none.
 pub(super) fn read_unfitted(path: &Path, options: &Options) -> Result<DepthFile, PictureFault> {
-    let values = values::read(path)?;
-    Ok(Meaning::decide(&values, options)?.into_depth(values, options))
+    let (values, note) = read_values(path, options)?;
+    let mut file = Meaning::decide(&values, options)?.into_depth(values, options);
+    file.notes.splice(..0, note);
+    Ok(file)
+}
+
+/// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth; and what was
+/// assumed.
+fn read_values(path: &Path, options: &Options) -> Result<(Values, Option<String>), PictureFault> {
+    let colored = match values::read(path) {
+        Err(PictureFault::ColoredDepth) if matches!(options.unit, None | Some(DepthUnit::Inverse)) => {
+            color_map::read(path)?
+        }
+        read => return read.map(|values| (values, None)),
+    };
+    let ColorMapped { values, name, ends: [near, far] } = colored;
+    match options.unit.is_some() || options.invert {
+        true => {
+            let near = if options.invert { far } else { near };
+            Ok((values, Some(format!("has the colours of {name}, of which {near} is taken as near"))))
+        }
+        false => Err(PictureFault::ColorMapped { name, near, far }),
+    }
+}
+
+/// Reads the range of the numbers of relative depth, for [`Options::range`]; `None` if the map has metres.
+pub(super) fn read_range(path: &Path, options: &Options) -> Result<Option<(f32, f32)>, PictureFault> {
+    let (values, _) = read_values(path, options)?;
+    Ok(Meaning::decide(&values, options)?.range_of(&values.numbers, options))
 }
 
 /// Reads a map of disparities in pixels, 0 = unknown: whole numbers of 16 bits are 1/256 px.

@@ -23,10 +23,15 @@ pub(super) const LAYOUT: Layout = Layout {
 };
 
 /// Suffixes of depth maps in the folder of the pictures.
-const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
+pub(super) const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
 
 fn is_map(stem: &str) -> bool {
     MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
+}
+
+/// Returns whether `dir` has pictures and their depth maps.
+pub(super) fn has_own_maps(dir: &Path) -> bool {
+    has_pictures(dir, |stem| !is_map(stem)) && find_maps(dir).is_some()
 }
 
 /// Returns the folder of a pattern's pictures, such as `DIR` of `DIR/IMG_%04d.jpg`; `None` if the path is not a
@@ -92,7 +97,7 @@ fn without_depth(dir: &Path, names: Vec<String>, options: &Options) -> Contents 
         right: None,
         depth: None,
     });
-    Contents { frames: frames.collect(), ..Contents::default() }
+    Contents { frames: frames.collect(), are_photos: true, ..Contents::default() }
 }
 
 /// Returns the folder of the depth maps for the pictures in `dir`, and the suffix of their stems.
@@ -116,7 +121,7 @@ fn refuse_other_sizes(folder: &RecordingFolder, names: &[String]) -> Result<(), 
     let (mut expected, mut locator) = (None, Locator::new(folder));
     for name in names {
         let source = PictureSource::from_path(name.into());
-        let Ok((found, _)) = decode::read_header(&locator.locate(&source)?) else { continue };
+        let Ok(found) = decode::read_upright_size(&locator.locate(&source)?) else { continue };
         let expected = *expected.get_or_insert(found);
         if found != expected {
             return Err(source.error(&folder.dir, PictureFault::Size { found, expected }));

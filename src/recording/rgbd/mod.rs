@@ -102,7 +102,8 @@ pub(super) fn from_pairs(
             depth: Some(PictureSource::from_path(if is_outside { maps_dir.join(map) } else { map })),
         }
     });
-    Ok(Contents { frames: frames.collect(), depth: Some(format), unpaired, ..Contents::default() })
+    let frames = frames.collect();
+    Ok(Contents { frames, depth: Some(format), unpaired, are_photos: true, ..Contents::default() })
 }
 
 /// Returns the encoding of depth, and a sentence about its unit.

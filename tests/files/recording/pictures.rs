@@ -4,8 +4,10 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
+use bokehcam::frame::ColorImage;
 use bokehcam::recording::pictures::{input_folders, pattern_folder};
-use bokehcam::recording::{Options, Recording, RecordingError, Unpaired};
+use bokehcam::recording::still::{read_color, write_photo};
+use bokehcam::recording::{Options, PhotoMetadata, Recording, RecordingError, Unpaired};
 
 use super::{SIZE, Scene, assert_says, color_of, depth_of, times_ns};
 
@@ -151,6 +153,41 @@ fn all_pictures_need_one_size() {
     let recording = open(&scene, "take").unwrap();
     assert_says(color_of(&recording, 0), &["take/1.png: not a PNG or JPEG"]);
     assert!(color_of(&recording, 1).is_ok());
+}
+
+#[test]
+fn photos_of_a_folder_are_turned_as_a_single_one_is() {
+    // One directory with one entry: the tag 0x112, a 16-bit number.
+    let exif =
+        |orientation: u8| [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..], &[orientation], &[0; 6]].concat();
+    let mut stored = ColorImage::new(SIZE.0, SIZE.1);
+    stored.rgb.iter_mut().enumerate().for_each(|(at, byte)| *byte = (at / 3) as u8);
+    for orientation in 1..=8 {
+        let scene = with_pictures(&[]);
+        for name in ["IMG_0001.jpg", "IMG_0002.png"] {
+            let metadata = PhotoMetadata { exif: Some(exif(orientation)), ..PhotoMetadata::default() };
+            write_photo(&scene.path(&format!("take/{name}")), &stored, &metadata, false).unwrap();
+        }
+        let upright = if orientation < 5 { SIZE } else { (SIZE.1, SIZE.0) };
+        for source in ["take", "take/IMG_%04d.jpg"] {
+            let recording = open(&scene, source).unwrap();
+            assert_eq!(recording.size(), upright, "{orientation}");
+            let single = read_color(&scene.path("take/IMG_0001.jpg")).unwrap();
+            assert!(color_of(&recording, 0).unwrap() == single && single.size() == upright);
+        }
+        // As in the picture, the map's rows are those of the upright view.
+        scene.depth("take/IMG_0001-depth.png", upright, 2000);
+        scene.depth("take/IMG_0002-depth.png", upright, 3000);
+        let recording = open(&scene, "take").unwrap();
+        assert_eq!(depth_of(&recording, 1).unwrap().metres[0], 3.0);
+        assert!(color_of(&recording, 1).unwrap() == read_color(&scene.path("take/IMG_0002.png")).unwrap());
+        scene.color("take/IMG_0003.png", SIZE, 9);
+        let others = open(&scene, "take");
+        match orientation {
+            5.. => assert_says(others, &["IMG_0003.png: the picture is 24x16", "16x24", "the same size"]),
+            _ => assert!(others.is_ok()),
+        }
+    }
 }
 
 /// A faulty recording of another kind keeps its message, and a folder without pictures is nothing.

@@ -23,7 +23,7 @@ use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
 use bokehcam::look::number::in_range_parser;
-use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, Strength};
+use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, SourceDepth, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
 
@@ -125,7 +125,8 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettin
         return Err(CliError::Usage(what.to_string()));
     }
     let look = look::build_look(&command.blur, &options::LookSettings::default())?;
-    let look = source::adapt_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
+    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
+    let look = source::adapt_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, known)?;
     unused::warn_of_unused(
         &given.settings,
         &unused::RunFacts {

@@ -61,8 +61,8 @@ Examples:
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
     /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a video (FILE.mp4 and others, by
-    /// ffmpeg), a photo (PNG or JPEG), - (y4m on standard input), `demo` (the demonstration) or `synthetic` (a scene,
-    /// rendered frame by frame)
+    /// ffmpeg), a photo, - (y4m on standard input), `demo` (the demonstration) or `synthetic` (a scene, rendered frame
+    /// by frame)
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
@@ -136,13 +136,14 @@ impl Opened {
     /// Opens the source, and warns of settings without effect on it.
     fn open(command: &StreamCommand, given: &GivenSettings) -> Result<Self, CliError> {
         let StreamCommand { parts, to, .. } = command;
-        let look = look::build_look(&parts.blur, &parts.computing.quality)?;
+        let given_look = look::build_look(&parts.blur, &parts.computing.quality)?;
         let options = source::Options { filters: command.is_filter(), ..parts.source_options() };
-        let source = Source::open(&command.source, &options, Some(&look))?;
+        let source = Source::open(&command.source, &options, Some(&given_look))?;
         let info = source.camera.info();
         let is_live = info.live || to.iter().any(Target::is_live);
         let pace = parts.stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-        let look = source.adapt_look(&look, &options)?;
+        let look = source.adapt_look(&given_look, &options)?;
+        focus::note_place(&given_look, &look);
         let unused = unused::RunFacts {
             source: unused::FrameOrigin::Source(command.source.kind()),
             depth: source.depth_from,

@@ -151,6 +151,7 @@ fn what_cannot_be_for_many_is_refused_before_anything_is_written() {
         (&["shots", "--depth-map", "shots/a-depth.png"], "--depth-map shots/a-depth.png: for many pictures this is"),
         (&["shots", "--mask", "shots/b.png"], "--mask shots/b.png: for many pictures this is a folder"),
         (&["shots", "--depth", "stereo"], "--depth stereo: "),
+        (&["shots", "--out-format", "gif"], "use png or jpg"),
     ] {
         render(&home, &[arguments, &["--out", "out", "--quiet"]].concat()).refused(2, &[expected]);
         assert!(!home.path("out").exists(), "{arguments:?}");
@@ -158,6 +159,25 @@ fn what_cannot_be_for_many_is_refused_before_anything_is_written() {
     for out in ["out.jpg", "shots/a.jpg"] {
         render(&home, &["shots/a.jpg", "shots/b.png", "--out", out]).refused(2, &["many pictures need a folder"]);
     }
+}
+
+#[test]
+fn all_results_have_the_format_that_is_asked_for() {
+    let home = with_shots();
+    for format in ["png", "jpg"] {
+        let out = format!("{format}s/");
+        let all = ["shots", "--effect", "blur", "--out", &out, "--out-format", format];
+        render(&home, &all).done();
+        let named = |stem: &str| format!("{stem}.{format}");
+        assert_eq!(names(&home.path(&out)), ["a", "b", "c"].map(named));
+        let kinds = names(&home.path(&out)).iter().all(|name| {
+            let start = fs::read(home.path(&out).join(name)).unwrap();
+            start.starts_with(if format == "png" { b"\x89PNG" } else { b"\xff\xd8\xff\xe0" })
+        });
+        assert!(kinds, "{format}");
+    }
+    let one = ["shots/a.jpg", "--out", "one.png", "--out-format", "jpg"];
+    render(&home, &one).refused(2, &["--out-format jpg: the name behind --out decides"]);
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod fuzz;
 #[cfg(feature = "gpu")]
 mod gpu_faults;
 mod heic;
+mod map_sequences;
 #[cfg(feature = "networks")]
 mod networks;
 mod orientation;

@@ -113,6 +113,22 @@ fn a_video_is_blurred_the_same_twice_and_a_cut_one_is_kept_up_to_its_cut() {
     home.run(&["stream", "clip.mp4", "--effect", "none", "--to", "clip.mp4", "--force"]).refused(2, &["--to"]);
 }
 
+/// A cut at an open group of pictures makes ffmpeg report an error, though every picture is there.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn an_error_of_ffmpeg_without_a_loss_is_a_warning() {
+    let home = Home::new();
+    let ffmpeg = |arguments: &str| {
+        Ran::of(Command::new("ffmpeg").current_dir(home.0.path()).args(["-v", "error"]).args(words(arguments))).done();
+    };
+    ffmpeg("-f lavfi -i testsrc=s=64x48:r=20:d=3 -c:v libx264 -x264-params open-gop=1:keyint=12:bframes=3 whole.ts");
+    ffmpeg("-ss 1.03 -i whole.ts -c copy part.ts");
+    let ran = home.run(&["stream", "part.ts", "--effect", "none", "--to", "part.y4m"]);
+    assert!(ran.warning().contains("ffmpeg says \"mmco: unref short failure"), "{}", ran.stderr);
+    let frames = fs::read(home.path("part.y4m")).unwrap().windows(6).filter(|bytes| bytes == b"FRAME\n").count();
+    assert!(ran.warning().contains(&format!("all of its {frames} pictures are there")) && frames > 30, "{frames}");
+}
+
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_killed_run_leaves_no_decoder() {

@@ -1,7 +1,6 @@
 //! Applies actions to the state.
 
 use super::{Action, DepthMethod, Output, Request, Source, State, ViewMode};
-use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and the source has none.
@@ -203,7 +202,7 @@ impl State {
         }
         let look = patch.apply_to(&self.look).map_err(|error| error.to_string())?;
         let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
-        let asks = matches!(patch.focus, Some(FocusRule::Metres(_)))
+        let asks = patch.focus.is_some_and(|focus| focus.for_depth(true).is_none())
             || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)
             || is_lens(&look) && !is_lens(&self.look);
         // In a whole look, such as a preset, metric settings are dropped instead of rejected.

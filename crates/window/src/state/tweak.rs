@@ -130,6 +130,8 @@ pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
                 metres.clamp(*FOCUS_DISTANCE_RANGE_M.start(), *FOCUS_DISTANCE_RANGE_M.end()),
             ))
         }
+        // A key's step of 0.02 moves it by as much of the range, away from the camera.
+        FocusRule::Relative(place) => FocusRule::Relative(round_significant((place + dx - dy).clamp(0.0, 1.0))),
         FocusRule::Auto => focus_on_point(0.5 + dx, 0.5 + dy),
         FocusRule::Point { x, y } | FocusRule::Track { x, y } => focus_on_point(x + dx, y + dy),
     };

@@ -19,9 +19,10 @@ use crate::sinks;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::control::Name;
+use bokehcam::depth::focus::FocusRule;
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{BackgroundSetting, Effect, Look};
+use bokehcam::look::{BackgroundSetting, Effect, Look, SourceDepth};
 use bokehcam::pipeline::Pace;
 use bokehcam::sink::Target;
 use bokehcam::source::{self, SourceName};
@@ -48,8 +49,8 @@ In the window, F1 shows all keys. Click to focus there, double-click on somethin
 A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
-    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a photo (PNG or JPEG), `demo` (the
-    /// demonstration) or `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
+    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a photo, `demo` (the demonstration) or
+    /// `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
     source: Option<String>,
     /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv,
     /// .webm or .mov from the start; may be given more than once
@@ -119,9 +120,12 @@ pub fn show_source(
     report::check_writable(stream.report.as_deref())?;
     let look = look::build_look(&parts.blur, &computing.quality)?;
     // Assumes depth: the source's depth is known only once it is open, and the window may open others.
-    let look = source::adapt_look(&look, &parts.blur.depth, true)?;
+    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
+    let focus = look.focus;
+    let look = Look { focus: focus.for_depth(false).unwrap_or(FocusRule::Auto), ..look };
+    let look = source::adapt_look(&look, &parts.blur.depth, known)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
-    let look = Look { effect, ..look };
+    let look = Look { effect, focus, ..look };
     let saved_state_file = file::state_folder().map(|folder| folder.join("window.toml"));
     // `--fresh` neither reads nor overwrites the remembered state.
     let saved_state_file = saved_state_file.filter(|_| !window.fresh);

@@ -22,6 +22,7 @@ use bokehcam::computing::ExecutorFactory;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::files::place;
 use bokehcam::look::Look;
+use bokehcam::recording::still::PhotoFormat;
 use bokehcam::source::DepthChoice;
 
 /// Peak memory per pixel of reading, blurring and encoding a picture.
@@ -30,6 +31,17 @@ const BYTES_PER_PIXEL: u64 = 120;
 const NETWORK_BYTES: u64 = 1 << 30;
 /// Pictures at a time on a GPU: one is blurred while others are read and written.
 const AT_ONCE_ON_GPU: usize = 3;
+
+/// Returns the format of all results, if it is not that of each picture: PNG keeps a transparent background.
+fn result_format(command: &RenderCommand, look: &Look) -> Result<Option<PhotoFormat>, CliError> {
+    match (look.background == Background::Transparent, command.out_format) {
+        (true, Some(PhotoFormat::Jpeg)) => {
+            let what = "--out-format jpg: JPEG keeps no transparency; use png, tif or webp for --behind transparent";
+            Err(CliError::Usage(what.to_owned()))
+        }
+        (is_transparent, format) => Ok(format.or(is_transparent.then_some(PhotoFormat::Png))),
+    }
+}
 
 /// What became of a picture.
 enum Outcome {
@@ -65,7 +77,8 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
         depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &["-depth", ".depth", ""])).transpose()?,
         mask: mask.map(|dir| MapFolder::read("--mask", dir, &["-mask", ".mask", ""])).transpose()?,
     };
-    let pictures = list_pictures(&command.images, &command.out, look.background == Background::Transparent)?;
+    let format = result_format(command, &look)?;
+    let pictures = list_pictures(&command.images, &command.out, format)?;
     refuse_overwriting_inputs(command, &maps, &pictures)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
     warn_of_leftovers([command.out.as_path()]);

@@ -56,9 +56,8 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
     let own_px = photo.color.size();
     transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;
     let mut input = Input { photo, depth: None, depth_from: DepthOrigin::Nothing, found: None };
-    if let Some(made) = compute_depth(command, look, (&input.photo.color, own_px))? {
-        // Masks and networks have their own scale.
-        (input.depth, input.depth_from) = (Some(made), DepthOrigin::Metres);
+    if let Some((made, from)) = compute_depth(command, look, (&input.photo.color, own_px))? {
+        (input.depth, input.depth_from) = (Some(made), from);
     } else if let Some(file) = &command.depth_map {
         let (mut map, from) = read_depth(file, command, look, own_px)?;
         source::find_person(&command.source_options(), look, &input.photo.color, &mut map);
@@ -87,13 +86,13 @@ fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut In
     Ok(())
 }
 
-/// Computes depth from a mask or by networks; returns `None` if neither is requested. `own_px` is the size of the
-/// picture in its file.
+/// Computes depth from a mask, by networks or from defocus, with its origin: its distances are relative. Returns `None` if
+/// none is requested. `own_px` is the size of the picture in its file.
 fn compute_depth(
     command: &RenderCommand,
     look: &Look,
     (color, own_px): (&ColorImage, (u32, u32)),
-) -> Result<Option<Depth>, CliError> {
+) -> Result<Option<(Depth, DepthOrigin)>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
         (_, DepthChoice::SingleCamera(_) | DepthChoice::Defocus) if is_given => {
@@ -113,21 +112,23 @@ fn compute_depth(
                 feather_px: usize::from(command.mask_feather),
                 is_exact: look.refine == Refine::Off,
             };
-            Ok(Some(Depth::Final(depth_from_mask(&mask, outline, color))))
+            Ok(Some((Depth::Final(depth_from_mask(&mask, outline, color)), DepthOrigin::Relative)))
         }
         (None, DepthChoice::SingleCamera(chosen)) => {
             let map = source::single_camera::compute_picture_depth(chosen, &command.source_options(), look, color)?;
             plausible::warn_of_subject(Some(chosen), &map, command.image.as_deref());
             // Depth with a subject includes its matte; other depth has soft outlines and is refined.
-            Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
+            let depth = if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) };
+            Ok(Some((depth, DepthOrigin::Networks)))
         }
         (None, DepthChoice::Defocus) => {
             source::reject_metric_look(look, "defocus gives")?;
-            defocus::estimate_depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
+            let Some(map) = defocus::estimate_depth(color) else {
                 let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so its \
                             depth cannot be estimated; use --depth mono or --effect blur";
-                CliError::Usage(what.to_string())
-            })
+                return Err(CliError::Usage(what.to_string()));
+            };
+            Ok(Some((Depth::Final(map), DepthOrigin::Relative)))
         }
         _ => Ok(None),
     }

@@ -36,12 +36,16 @@ pub(super) fn is_many(images: &[PathBuf], out: &Path) -> bool {
     }
 }
 
-/// Lists the pictures of `images`, each once, with results in the folder `out`: all of them PNG if `has_alpha`. Depth
+/// Lists the pictures of `images`, each once, with results in the folder `out`, in `format` or that of each picture. Depth
 /// maps and originals of snapshots among them are left out.
 ///
 /// # Errors
 /// `out` is no folder, a folder cannot be read, there is no picture, or two would have the same result.
-pub(super) fn list_pictures(images: &[PathBuf], out: &Path, has_alpha: bool) -> Result<Vec<Picture>, CliError> {
+pub(super) fn list_pictures(
+    images: &[PathBuf],
+    out: &Path,
+    format: Option<PhotoFormat>,
+) -> Result<Vec<Picture>, CliError> {
     if !is_folder(out) && (out.exists() || still::photo_format(out).is_ok()) {
         let out = out.display();
         return Err(CliError::Usage(format!(
@@ -67,7 +71,7 @@ pub(super) fn list_pictures(images: &[PathBuf], out: &Path, has_alpha: bool) -> 
         }
         left => log::note(&format!("{left} files left out by their names: depth maps, or pictures of snapshots")),
     }
-    let result_name = |path: &Path| result_name(path, has_alpha);
+    let result_name = |path: &Path| result_name(path, format);
     let mut owners: HashMap<OsString, &Path> = HashMap::new();
     for path in &paths {
         if let Some(other) = owners.insert(result_name(path), path) {
@@ -114,12 +118,11 @@ fn expand(image: &Path) -> Result<Vec<PathBuf>, CliError> {
     Ok(paths.into_iter().filter(|path| is_picture(path)).collect())
 }
 
-/// Returns the file name of a picture's result: that of the picture, with the extension of its kind, or of PNG if it
-/// `has_alpha`.
-fn result_name(path: &Path, has_alpha: bool) -> OsString {
+/// Returns the file name of a picture's result: that of the picture, with the extension of `format` or its own.
+fn result_name(path: &Path, format: Option<PhotoFormat>) -> OsString {
     // A picture that cannot be read is named by its extension.
-    let kind = still::result_format(path).or_else(|| still::photo_format(path).ok()).filter(|_| !has_alpha);
+    let own = || still::result_format(path).or_else(|| still::photo_format(path).ok());
     let mut name = path.file_stem().unwrap_or_default().to_owned();
-    name.push(if kind == Some(PhotoFormat::Jpeg) { ".jpg" } else { ".png" });
+    name.push(format!(".{}", format.or_else(own).unwrap_or(PhotoFormat::Png)));
     name
 }

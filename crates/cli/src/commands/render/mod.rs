@@ -37,7 +37,8 @@ use bokehcam::engine;
 use bokehcam::engine::still::{Depth, Rendered};
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureSetting, Look, Refine, Strength};
+use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
+use bokehcam::names;
 use bokehcam::recording::still::{self, PhotoFormat};
 use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::photo;
@@ -95,6 +96,9 @@ pub struct RenderCommand {
     /// is given
     #[arg(long, alias = "to", value_name = "FILE")]
     out: PathBuf,
+    /// Format of the results of many pictures, png, jpg, tif or webp [default: that of each picture]
+    #[arg(long, value_name = "FORMAT", value_parser = names::parse_name::<PhotoFormat>)]
+    out_format: Option<PhotoFormat>,
     /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
     /// filters, the filled background; and plan.json (CPU executor)
     #[arg(long, value_name = "DIR")]
@@ -120,6 +124,10 @@ pub struct RenderCommand {
 pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
     if listing::is_many(&command.images, &command.out) {
         return batch::run(&command, global, given);
+    }
+    if let Some(format) = command.out_format {
+        let what = format!("--out-format {format}: the name behind --out decides; the option is for many pictures");
+        return Err(CliError::Usage(what));
     }
     command.image = command.images.pop();
     check_outputs(&command)?;
@@ -200,18 +208,15 @@ struct RenderedFile {
 fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<RenderedFile, CliError> {
     let Input { mut photo, depth, depth_from, found } = read_input(command, look)?;
     let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
-    let look = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
-    let look = source::adapt_look(&look, &command.blur.depth, depth.is_some())?;
+    let known =
+        SourceDepth { has_depth: depth.is_some(), is_relative: depth_from.is_relative(), size: photo.color.size() };
+    let wanted = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
+    let adapted = source::adapt_look(&wanted, &command.blur.depth, known)?;
+    focus::note_place(look, &adapted);
+    let look = adapted;
     plausible::warn_of_lens(&look);
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
-    // As in a stream of this photo: only measured depth is refined.
-    let look = match &found {
-        Some(found) if look.refine == Refine::Auto => {
-            Look { refine: if found.measured { Refine::On } else { Refine::Off }, ..look }
-        }
-        _ => look,
-    };
     let computing = command.computing.to_compute_options();
     let executor = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(&mut photo, depth, &look, &computing, (dir, command.output.force))?,

@@ -6,7 +6,7 @@ use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureSetting, CocRule, Effect, Patch, Refine, SETTINGS, Strength, Tilt};
+use bokehcam::look::{ApertureSetting, CocRule, Effect, Patch, Refine, SETTINGS, SourceDepth, Strength, Tilt};
 use bokehcam::optics::{CocField, Lens};
 use bokehcam::source::{SourceError, adapt_look};
 
@@ -18,7 +18,7 @@ fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, SourceError> {
     let every = options::Every::from_arg_matches(&matches).unwrap();
     let look =
         build_look(&every.blur, &every.computing.quality).map_err(|error| SourceError::Usage(error.to_string()))?;
-    adapt_look(&look, &every.blur.depth, has_depth)
+    adapt_look(&look, &every.blur.depth, SourceDepth { has_depth, ..SourceDepth::default() })
 }
 
 fn refusal(flags: &[&str], has_depth: bool) -> String {

@@ -16,7 +16,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let (is_point, metres) = match focus {
         FocusRule::Metres(metres) => (false, metres),
         FocusRule::Point { .. } | FocusRule::Track { .. } => (true, now_m),
-        FocusRule::Auto => (false, now_m),
+        FocusRule::Auto | FocusRule::Relative(_) => (false, now_m),
     };
     let point = if is_point { focus } else { FocusRule::Point { x: 0.5, y: 0.5 } };
     let distance = match focus {

@@ -60,7 +60,7 @@ impl SessionWorker {
     pub(super) fn save_frame(&self, still: &Still, SaveOptions { with_sources, request }: &SaveOptions) {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_look.map_or(&self.config.look, |(_, look)| look);
-        let settings = Patch::from_look(&look.for_frame(&still.coc, still.quality)).values();
+        let settings = Patch::from_look(&look.for_saved_frame(&still.coc, still.quality)).values();
         let Images { color, depth, blurred: picture } = &still.images;
         let sources = with_sources.then_some((color, depth.as_ref()));
         let snapshot = Snapshot { picture, sources, settings: &settings };

@@ -181,3 +181,51 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
     watched.until("it has gone", |told| matches!(told, Update::Choices { .. }) && !has_it(told));
     watched.heard.session.close();
 }
+
+#[test]
+fn a_folder_of_pictures_plays_is_sought_in_and_repeats() {
+    let folder = tempfile::tempdir().unwrap();
+    for frame in 0..FRAMES {
+        let mut color = ColorImage::new(48, 32);
+        color.rgb.fill(20 * frame as u8);
+        still::write_color(&folder.path().join(format!("IMG_{frame:04}.png")), &color, false).unwrap();
+    }
+    plays_sought_in_and_repeats(&folder.path().display().to_string());
+    plays_sought_in_and_repeats(&folder.path().join("IMG_%04d.png").display().to_string());
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_video_plays_is_sought_in_and_repeats() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = folder.path().join("film.mp4");
+    let mut ffmpeg = std::process::Command::new("ffmpeg");
+    // Each frame is 20 brighter than the one before.
+    ffmpeg.args(["-v", "error", "-f", "lavfi", "-i", "color=black:s=48x32:r=25,geq=r=20*N:g=20*N:b=20*N"]);
+    ffmpeg.args(["-frames:v", &FRAMES.to_string(), "-c:v", "libx264", "-pix_fmt", "yuv420p"]).arg(&film);
+    assert!(ffmpeg.status().unwrap().success());
+    plays_sought_in_and_repeats(&film.display().to_string());
+}
+
+/// Plays a source whose frames are each 20 brighter than the one before, and seeks in it.
+fn plays_sought_in_and_repeats(source: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut watched = Watched::begin(source, folder.path());
+    watched.session.send(Request::Look(Box::new(Look::with_effect(bokehcam::look::Effect::None))));
+    watched.frame("a frame", |_| true);
+    let seeker = watched.seeker.clone().expect("it is gone back and forth in");
+    assert_eq!(seeker.frames(), FRAMES);
+    let mut last_ns = 0;
+    for place in [8, 3, 11, 0, 11] {
+        let number = seeker.request_frame(place);
+        let asked = watched.frame("the frame that was asked for", |view| view.is_seek_target && view.seek == number);
+        assert_eq!(seeker.position_of(asked.stamp), place);
+        let rgb = asked.picture.memory().unwrap().rgb[0];
+        assert!(rgb.abs_diff(20 * place as u8) <= 4, "{rgb} of frame {place}");
+        assert!(asked.stamp.time_ns > last_ns || last_ns == 0, "media time goes on");
+        last_ns = asked.stamp.time_ns;
+    }
+    // After the last frame comes the first again.
+    watched.frame("the next lap", |view| !view.is_seek_target && view.stamp.index < 8 && view.stamp.time_ns > last_ns);
+    assert!(watched.heard.session.close().report.unwrap().frames.is_balanced());
+}
