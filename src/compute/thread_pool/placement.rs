@@ -74,7 +74,7 @@ impl Placement {
             return;
         }
         self.excluded.store(NONE, Ordering::Relaxed);
-        // Read again, in case that somebody else changed it meanwhile.
+        // Read again, as another program may have changed it meanwhile.
         if let Ok(mut allowed) = sched_getaffinity(None) {
             allowed.set(excluded as usize);
             let _ = sched_setaffinity(None, &allowed);
