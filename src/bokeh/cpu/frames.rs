@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use pulp::Arch;
+
 use super::{CpuBokeh, Radii};
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::compute::{Backend, simd};
@@ -69,6 +71,11 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::instruction_set(self.arch))
+        describe(self.workers.thread_count(), self.arch)
     }
+}
+
+/// Describes the executor in one line.
+pub(super) fn describe(threads: usize, arch: Arch) -> String {
+    format!("cpu, {threads} threads, {}", simd::instruction_set(arch))
 }

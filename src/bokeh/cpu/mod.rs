@@ -1,6 +1,7 @@
 //! The CPU executor: uses every core and the best vector instructions available, and allocates nothing per frame.
 
 mod band;
+mod banded;
 mod bin;
 mod bin_parts;
 mod blur;
@@ -40,13 +41,14 @@ use silhouettes::Silhouettes;
 use tiles::{BLOCK, Tiles};
 use unpack::InputFrame;
 
-use super::BlurredFrame;
 use super::ladder::Compositing;
 use super::plan::{CELL, Plan};
 use super::reuse::CONTENT_BIN_W;
+use super::{BlurredFrame, Bokeh};
 use crate::budget::Quality;
 use crate::compute::thread_pool::{ThreadPool, core_count};
 
+pub use banded::{BandedBokeh, MAX_WHOLE_PIXELS};
 pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compression_factor, expansion_factor};
 
@@ -74,6 +76,14 @@ pub struct CpuBokeh {
     done: Option<BlurredFrame>,
     /// Fraction of the last frame that was kept from earlier ones.
     kept_fraction: f32,
+}
+
+/// Creates an executor of `plan` on `threads` threads (all cores when `None`): in bands of rows for large pictures.
+pub fn create(plan: Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
+    match plan.width * plan.height > MAX_WHOLE_PIXELS {
+        true => Box::new(BandedBokeh::new(plan, threads)),
+        false => Box::new(CpuBokeh::new(plan, threads)),
+    }
 }
 
 /// Scratch memory of one thread.
