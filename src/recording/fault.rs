@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::MAX_SIDE_PX;
+use super::{MAX_PIXELS, MAX_SIDE_PX};
 
 /// A fault in a line of a list.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -116,7 +116,10 @@ pub enum PictureFault {
     #[error("it has a form that is not read ({0}); convert it to PNG")]
     Unsupported(String),
     /// The header states more pixels than are supported.
-    #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
+    #[error(
+        "its header claims {width}x{height} pixels, and at most {MAX_SIDE_PX} a side and {} megapixels are read; scale it \
+         down", MAX_PIXELS / 1_000_000
+    )]
     TooLarge { width: u32, height: u32 },
     /// The file is larger than any supported picture.
     #[error("the file has {bytes} bytes, and at most {max_bytes} are read; convert it")]

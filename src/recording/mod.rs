@@ -59,8 +59,10 @@ const LAYOUTS: [Layout; 6] =
     [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT, rgbd::LAYOUT, pictures::LAYOUT];
 
 /// Maximum width and height; larger pictures are rejected by their header, before memory is allocated. Reading the
-/// largest takes at most four times the 192 MiB of its RGB.
-const MAX_SIDE_PX: u32 = 8192;
+/// largest takes at most four times the 343 MiB of its RGB.
+const MAX_SIDE_PX: u32 = 16384;
+/// Maximum number of pixels: cameras have up to 102 megapixels.
+const MAX_PIXELS: u64 = 120_000_000;
 
 /// Counts of listed pictures that belong to no frame, because no counterpart is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

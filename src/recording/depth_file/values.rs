@@ -9,7 +9,7 @@ use image::{ImageBuffer, Luma, imageops};
 
 use super::{FORMATS, exr, npy, tiff};
 use crate::files::input;
-use crate::recording::MAX_SIDE_PX;
+use crate::recording::MAX_PIXELS;
 use crate::recording::coded::{self, EncodedPicture};
 use crate::recording::fault::PictureFault;
 use crate::recording::pfm;
@@ -62,7 +62,7 @@ impl Values {
 }
 
 /// Largest file of floats: 8 bytes per pixel, and room for a header.
-const MAX_FLOATS_BYTES: u64 = 8 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + (1 << 20);
+const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
 
 /// Reads a map; the first bytes decide its format.
 pub(super) fn read(path: &Path) -> Result<Values, PictureFault> {
