@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 
 use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
+use image::{ImageEncoder, ImageError, ImageResult};
 use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{self, DISPARITY_SCALE, MapUnit};
-use super::{jpeg, xmp};
+use super::{jpeg, jpeg_intervals, xmp};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// High enough that compression artefacts stay invisible.
@@ -44,14 +44,16 @@ pub(super) fn encode_photo_png(
 
 /// Appends `image` to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP.
 pub(super) fn encode_photo_jpeg(image: &ColorImage, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
-    let mut encoder = JpegEncoder::new_with_quality(&mut *file, JPEG_QUALITY);
-    if let Some(profile) = &metadata.icc_profile {
-        encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
-    }
-    if let Some(exif) = &metadata.exif {
-        encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
-    }
-    encoder.write_image(&image.rgb, image.width, image.height, ExtendedColorType::Rgb8)?;
+    let set_metadata = |encoder: &mut JpegEncoder<&mut Vec<u8>>| {
+        if let Some(profile) = &metadata.icc_profile {
+            encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
+        }
+        if let Some(exif) = &metadata.exif {
+            encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
+        }
+        Ok(())
+    };
+    jpeg_intervals::encode(image, JPEG_QUALITY, set_metadata, file)?;
     if let Some(packet) = &metadata.xmp {
         jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }

@@ -23,6 +23,7 @@ mod file_kind;
 mod folder;
 mod heif;
 mod jpeg;
+mod jpeg_intervals;
 mod kitti;
 mod list;
 mod middlebury;
