@@ -117,7 +117,7 @@ pub struct Findings {
     /// The focus that a photo was taken with, which replaces `auto`.
     pub focus: Option<FocusRule>,
     /// The sharp original inside a photo, which is then the picture.
-    pub original: Option<ColorImage>,
+    pub original: Option<Arc<ColorImage>>,
 }
 
 /// Options for opening a source.
@@ -147,6 +147,8 @@ struct OpenRequest<'a> {
     options: &'a Options,
     /// The look that the depth is for; `None` if depth is wanted as such, for example to record it.
     look: Option<&'a Look>,
+    /// The picture of a photo, if it is decoded already.
+    photo: Option<Arc<ColorImage>>,
 }
 
 /// Part of the message that rejects metres for relative inverse depth.
@@ -162,11 +164,14 @@ impl Source {
     /// # Errors
     /// The source cannot be read, has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
-        let request = OpenRequest { options, look };
-        let source = Self::open_with_own_depth(name, &request)?;
-        let source = networks::add_network_depth(source, &request);
-        let source = external_depth::add_external_depth(source, name, &request, &Clock::system())?;
-        Ok(networks::add_person_detection(source, &request))
+        Self::open_requested(name, &OpenRequest { options, look, photo: None })
+    }
+
+    fn open_requested(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
+        let source = Self::open_with_own_depth(name, request)?;
+        let source = networks::add_network_depth(source, request);
+        let source = external_depth::add_external_depth(source, name, request, &Clock::system())?;
+        Ok(networks::add_person_detection(source, request))
     }
 
     /// Creates a source from a camera that the caller has opened; `depth` provides depth in metres for its frames.
@@ -303,8 +308,9 @@ impl OpenRequest<'_> {
 
     fn check_effect(&self) -> Result<(), SourceError> {
         if self.options.depth_choice == DepthChoice::Stereo && !self.uses_depth() {
-            let what = "--depth stereo: only --effect dof uses depth; leave --depth or --effect out";
-            return Err(SourceError::Usage(what.to_string()));
+            return SourceError::usage_error(
+                "--depth stereo: only --effect dof uses depth; leave --depth or --effect out",
+            );
         }
         Ok(())
     }

@@ -103,7 +103,7 @@ impl Opened {
                 })
             }
             SourceName::Photo(path) => {
-                let photo::ReadPhoto { color, depth, depth_from, findings } = photo::read_photo(path, request.options)?;
+                let photo::ReadPhoto { color, depth, depth_from, findings } = photo::read_photo(path, request)?;
                 request.check_relative_depth(depth_from)?;
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
                 let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
