@@ -27,12 +27,18 @@ pub struct Stamp {
 
 /// Resizes `values` to `count`; the content is unspecified afterwards. New memory comes zeroed from the system, which
 /// provides pages only as they are used.
-fn resize_buffer<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+pub(crate) fn resize_buffer<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
     if values.capacity() < count {
         *values = vec![T::default(); count];
     } else {
         values.resize(count, T::default());
     }
+}
+
+/// Sets `values` to `count` defaults; new memory is like that of [`resize_buffer`].
+pub(crate) fn reset_buffer<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+    values.clear();
+    resize_buffer(values, count);
 }
 
 /// An 8-bit sRGB picture: `height` x `width` x 3 bytes (R, G, B), row-major, no padding.

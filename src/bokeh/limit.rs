@@ -1,5 +1,6 @@
 //! Limits of the blur radius and of the picture size.
 
+use super::cpu::MAX_WHOLE_PIXELS;
 use super::{BokehError, Method, Rank, Settings};
 use crate::compute::memory;
 use crate::optics::CocKind;
@@ -10,8 +11,9 @@ const MAX_GATHERED_PX: f32 = 512.0;
 /// grow with the square of the radius.
 const MAX_EXACT_PX: f32 = 128.0;
 /// Peak memory per pixel of preparing and blurring a picture, at the finest quality with refined depth (measured:
-/// `docs/reliability.md`).
+/// `docs/reliability.md`): as a whole, and of one that is blurred in bands.
 const BYTES_PER_PIXEL: u64 = 90;
+const BANDED_BYTES_PER_PIXEL: u64 = 32;
 /// Pictures of at most this many pixels are not checked: the estimate leaves out memory that does not grow with the
 /// picture.
 const UNCHECKED_PIXELS: u64 = 16 << 20;
@@ -43,7 +45,9 @@ impl Settings {
     /// [`BokehError::Memory`].
     pub(crate) fn check_memory(size: (u32, u32), extra_bytes_per_pixel: u64) -> Result<(), BokehError> {
         let pixels = u64::from(size.0) * u64::from(size.1);
-        let needed = pixels * (BYTES_PER_PIXEL + extra_bytes_per_pixel);
+        let is_banded = pixels > MAX_WHOLE_PIXELS as u64;
+        let bytes_per_pixel = if is_banded { BANDED_BYTES_PER_PIXEL } else { BYTES_PER_PIXEL };
+        let needed = pixels * (bytes_per_pixel + extra_bytes_per_pixel);
         match memory::free_bytes().filter(|&free| pixels > UNCHECKED_PIXELS && needed > free) {
             Some(free) => Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 }),
             None => Ok(()),

@@ -12,7 +12,12 @@
 //! 6. `composite`: front to back as disjoint coverage; the uncovered rest has the colour of the hindmost bin; back to
 //!    8-bit sRGB.
 
+mod band;
+mod slots;
+
 use std::sync::Arc;
+
+use band::BandRows;
 
 use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
@@ -101,6 +106,8 @@ pub struct Plan {
     pub reuse: bool,
     /// Changes whenever the bins behind the focal plane do.
     pub generation: u64,
+    /// Set if this is the plan of a band of a larger picture ([`Plan::for_band`]).
+    band: Option<BandRows>,
     coc: CocKind,
     /// Whether bins stay at full scale up to a radius of [`MAX_FULL_RADIUS_PX`].
     full_scale: bool,
@@ -141,6 +148,7 @@ impl Plan {
             reuse: settings.reuse,
             generation: 0,
             ladder,
+            band: None,
             coc: settings.coc,
             full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
@@ -187,7 +195,7 @@ impl Plan {
 
     /// Splits the CoC of a frame into bins, if the CoC follows depth and bins are layers; otherwise the bins stay.
     pub fn split_by_depth(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
-        if self.compositing != Compositing::Layers {
+        if !self.follows_depth() {
             return;
         }
         match (coc, depth) {
@@ -199,7 +207,7 @@ impl Plan {
 
     /// Same as [`Plan::split_by_depth`], given the radius of every pixel.
     pub fn split_by_radii(&mut self, coc_px: &[f32]) {
-        if self.compositing == Compositing::Layers {
+        if self.follows_depth() {
             self.histogram.count_radii(coc_px, self.width);
             self.plan_layers();
         }
@@ -281,33 +289,9 @@ impl Plan {
         self.bank.terms < if self.bank.is_symmetric { half_width } else { 2 * half_width }
     }
 
-    /// Returns the finest scale of any bin in this slot, over all levels: layers far from focus are always reduced.
-    pub fn min_scale(&self, slot: usize) -> usize {
-        let side = self.ladder.max_bins_per_side();
-        let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.max_fine_bins();
-        if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
-    }
-
-    /// Returns the number of bin slots that an executor needs, over all levels.
-    pub fn slot_count(&self) -> usize {
-        match self.coc {
-            CocKind::Depth if self.compositing == Compositing::Gather => 1,
-            CocKind::Depth => 1 + 2 * self.ladder.max_bins_per_side(),
-            CocKind::Ramp if self.ranges[0].is_empty() => 1,
-            CocKind::Ramp => 1 + self.ladder.max_bins_per_side(),
-            // The only bin is in slot 1.
-            CocKind::Uniform => 2,
-        }
-    }
-
     /// Returns the outermost tap of a bin's filters, in bin pixels.
     pub fn bin_half_width(&self, bin: &Bin) -> usize {
         self.bank.node_half_width[self.bank.nearest_node(bin.max_radius_px)] as usize
-    }
-
-    /// Returns the index of the bin in a slot, in this frame.
-    pub fn bin_in_slot(&self, slot: usize) -> Option<usize> {
-        self.bins.iter().position(|bin| bin.slot == slot)
     }
 
     /// Returns the radius of the neighbourhood of a cell, in cells: the filter support and one segment, for which a
@@ -331,7 +315,7 @@ impl Plan {
     /// depth of the picture's size.
     pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
         let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
-        let some = 1..=Matte::max_pixels(self.width, self.height);
+        let some = 1..=Matte::max_pixels(self.width, self.picture_rows());
         let apart = self.compositing == Compositing::Layers && matches!(coc, CocField::Depth(_));
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }

@@ -1,12 +1,14 @@
 //! A photo as a camera: a single, static frame.
 
+use std::sync::Arc;
+
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use crate::frame::{ColorImage, Stamp};
 
 /// Delivers one picture repeatedly.
 pub struct Photo {
     name: String,
-    color: ColorImage,
+    color: Arc<ColorImage>,
     /// Total number of frames; `None` never ends.
     frames: Option<u64>,
     delivered: u64,
@@ -17,9 +19,9 @@ const PERIOD_NS: u64 = 100_000_000;
 
 impl Photo {
     /// Shows `color` once, or, if `repeated`, `frames` times or endlessly.
-    pub fn new(color: ColorImage, name: &str, repeated: bool, frames: Option<u64>) -> Self {
+    pub fn new(color: impl Into<Arc<ColorImage>>, name: &str, repeated: bool, frames: Option<u64>) -> Self {
         let frames = if repeated { frames } else { Some(1) };
-        Self { name: name.to_owned(), color, frames, delivered: 0 }
+        Self { name: name.to_owned(), color: color.into(), frames, delivered: 0 }
     }
 
     fn is_at_end(&self) -> bool {

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, resize_buffer};
 
 /// Depths within this ratio are one surface, whose holes need no decision.
 pub const SAME_SURFACE: f32 = 1.15;
@@ -86,8 +86,8 @@ impl GuidedHoleFill {
         if color.size() != map.size() || holes.is_empty() {
             return;
         }
-        self.claims_m.resize(width * height, 0.0);
-        self.is_hole.resize(width * height, false);
+        resize_buffer(&mut self.claims_m, width * height);
+        resize_buffer(&mut self.is_hole, width * height);
         holes.iter().for_each(|hole| self.is_hole[hole.pixels(width)].fill(true));
         let max_hole_px = max_hole_px(width);
         for &hole in holes {

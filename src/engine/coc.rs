@@ -38,6 +38,8 @@ pub struct CocCalculator {
     focus: Focus,
     postprocessor: Postprocessor,
     correction: MapCorrection,
+    /// Whether there is only one picture, of which nothing is kept for the next.
+    single: bool,
     /// The GPU that refines depth and estimates mattes; `None` is the CPU.
     device: Option<Arc<Device>>,
     matting: Matting,
@@ -54,11 +56,18 @@ enum Postprocessor {
 }
 
 impl Postprocessor {
-    fn new(postprocess: Postprocess, correction: MapCorrection, device: Option<&Arc<Device>>) -> Self {
+    fn new(
+        postprocess: Postprocess,
+        (correction, single): (MapCorrection, bool),
+        device: Option<&Arc<Device>>,
+    ) -> Self {
         match postprocess {
             Postprocess::Keep => Self::Keep,
             Postprocess::Fill => Self::Fill(Box::default()),
-            Postprocess::Refine => Self::Refine(Box::new(Refiner::with_correction(correction).with_device(device))),
+            Postprocess::Refine => {
+                let refiner = Refiner::with_correction(correction).for_single_pictures(single);
+                Self::Refine(Box::new(refiner.with_device(device)))
+            }
         }
     }
 
@@ -82,12 +91,13 @@ impl CocCalculator {
     /// Creates a calculator without history, which works on the caller's thread.
     pub fn new(rule: CocRule, postprocess: Postprocess) -> Self {
         let (focus, correction) = (Focus::new(focus_rule(rule)), MapCorrection::default());
-        let (postprocessor, matting) = (Postprocessor::new(postprocess, correction, None), Matting::default());
+        let (postprocessor, matting) = (Postprocessor::new(postprocess, (correction, false), None), Matting::default());
         Self {
             rule,
             focus,
             postprocessor,
             correction,
+            single: false,
             device: None,
             matting,
             has_estimated_matte: false,
@@ -104,6 +114,13 @@ impl CocCalculator {
     /// Uses `threads` threads, the caller's included; the results are bit-identical.
     pub fn with_threads(self, threads: usize) -> Self {
         Self { workers: ThreadPool::new("depth", threads), ..self }
+    }
+
+    /// Processes a single picture if `single`: keeps nothing of it for a next one, which saves memory.
+    pub fn for_single_picture(mut self, single: bool) -> Self {
+        self.single = single;
+        self.reset_postprocessor(self.postprocessor.postprocess());
+        self
     }
 
     /// Refines depth and estimates mattes on `device` from now on. No effect if it is `None` or already in use.
@@ -144,8 +161,8 @@ impl CocCalculator {
         let uses_depth = matches!(self.rule, CocRule::Depth { .. });
         // The old postprocessor's buffers on the device do not belong to the next map.
         self.matting.set_device_frame(None);
-        self.postprocessor =
-            Postprocessor::new(postprocess, self.correction, self.device.as_ref().filter(|_| uses_depth));
+        let device = self.device.as_ref().filter(|_| uses_depth);
+        self.postprocessor = Postprocessor::new(postprocess, (self.correction, self.single), device);
     }
 
     /// Sets the correction of misaligned depth edges; returns whether maps are refined, so that it takes effect.

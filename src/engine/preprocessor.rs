@@ -94,10 +94,11 @@ impl Preprocessor {
             Origin::Single => look.refine != Refine::Off,
             Origin::Synthesized | Origin::Measured => true,
         };
+        let coc = CocCalculator::new(look.coc_rule(input.size), postprocess).with_threads(input.threads);
         let mut new = Self {
             input,
             postprocess,
-            coc: CocCalculator::new(look.coc_rule(input.size), postprocess).with_threads(input.threads),
+            coc: coc.for_single_picture(input.frames == Some(1)),
             exactness: create_exactness_detector(look, postprocess),
             composer: Composer::new(look, input.playback),
             check: checks.then(|| FitCheck::new(input.frames)),

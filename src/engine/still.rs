@@ -2,10 +2,10 @@
 
 use super::frame_processor::reject_transparency;
 use super::{Blur, Images, Input, Kept, Origin, Playback, Preprocessor};
-use crate::bokeh::cpu::CpuBokeh;
 use crate::bokeh::plan::Plan;
-use crate::bokeh::{Bokeh, BokehError};
+use crate::bokeh::{BokehError, cpu};
 use crate::color::Picture16;
+use crate::compute::thread_pool::core_count;
 use crate::computing::ComputeOptions;
 use crate::depth::backdrop::{Background, CutOut};
 use crate::frame::{ColorImage, DepthMap};
@@ -33,7 +33,7 @@ pub struct Rendered {
 
 /// Computes the circle of confusion of every pixel of `color`; returns it with the depth map, if it follows depth. A
 /// measured map is returned with its holes filled; it is refined if the look asks for it, or leaves it open and the map
-/// does not fit the picture. A virtual background is put into the picture.
+/// does not fit the picture. A virtual background is put into the picture. Uses all cores.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] if the blur follows depth and none is given; the look's background is transparent.
@@ -43,14 +43,16 @@ pub fn compute_coc_and_depth(
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     reject_transparency(look)?;
-    prepare(look, color, depth).map(|(field, map, _)| (field, map))
+    prepare(look, color, depth, core_count()).map(|(field, map, _)| (field, map))
 }
 
-/// Does the same for any background, and returns what is kept of the picture if that is transparent.
+/// Does the same on `threads` threads, with bit-identical results, for any background; returns what is kept of the
+/// picture if that is transparent.
 fn prepare(
     look: &Look,
     color: &mut ColorImage,
     depth: Option<Depth>,
+    threads: usize,
 ) -> Result<(CocField, Option<DepthMap>, Option<Pooled<Kept>>), BokehError> {
     let (depth, mut map) = match depth {
         Some(Depth::Measured(map)) => (Origin::Single, Some(map)),
@@ -58,7 +60,7 @@ fn prepare(
         None => (Origin::Finished, None),
     };
     let playback = Playback::Still;
-    let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, playback, threads: 1 };
+    let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, playback, threads };
     // A single picture is never cropped.
     let (field, composed) = Preprocessor::new(look, input).preprocess(color, map.as_mut(), 0)?;
     Ok((field, map.filter(|_| matches!(field, CocField::Depth(_))), composed.kept))
@@ -94,7 +96,7 @@ pub fn render_picture(
     if look.coc_kind().is_none() {
         return Ok(Rendered { color, alpha: None, by: "not blurred".to_string() });
     }
-    let (coc, depth, kept) = prepare(look, &mut color, depth)?;
+    let (coc, depth, kept) = prepare(look, &mut color, depth, computing.thread_count())?;
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
     blur.set_look(look, (size, false), |settings| computing.create_blur(settings, size))?;
     blur.blur(&mut images, coc)?;
@@ -129,11 +131,11 @@ pub fn blur_picture_16bit(
     let size = color.size();
     let Some(settings) = look.blur_settings(size, false) else { return Ok((picture, "not blurred".to_string())) };
     settings.check(size)?;
-    let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), threads);
     let (coc, depth) = prepare_16bit(look, &mut color, &mut picture, depth)?;
     drop(color);
-    let blurred = cpu.blur_16bit(&picture, depth.as_ref(), &coc)?;
-    Ok((blurred, format!("{}, 16 bits", cpu.describe())))
+    let plan = Plan::new(&settings, size.0, size.1);
+    let (blurred, by) = cpu::blur_16bit(plan, threads, &picture, depth.as_ref(), &coc)?;
+    Ok((blurred, format!("{by}, 16 bits")))
 }
 
 /// Does the same as [`compute_coc_and_depth`] for 16-bit codes, of which `color` shows the light as 8-bit sRGB.

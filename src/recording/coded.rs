@@ -1,19 +1,18 @@
 //! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
-//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows. Besides the pixels,
-//! a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel; other files need
-//! [`MAX_DECODER_BYTES`].
+//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows, and [`MAX_PIXELS`].
+//! Besides the pixels, a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel;
+//! other files need [`MAX_DECODER_BYTES`].
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
-use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use image::{ColorType, ImageDecoder, ImageFormat, ImageReader};
 
-use super::MAX_SIDE_PX;
-use super::fault::PictureFault;
+use super::fault::{PictureFault, decoder_fault, open_fault, png_fault};
 use super::file_kind::{self, FileKind};
 use super::heif;
 use super::jpeg;
@@ -22,16 +21,17 @@ use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
 use super::tiff_directory::is_raw_tiff;
 use super::tiff_file::{TiffPhotoDecoder, Undecoded};
+use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::files::input;
 
 /// What a message names where no picture is found.
 const PICTURES: &str = "PNG or JPEG";
 
-/// Far more than a photograph of 8192 x 8192 pixels needs.
-const MAX_JPEG_BYTES: u64 = 96 << 20;
+/// Far more than a photograph of [`MAX_PIXELS`] needs.
+const MAX_JPEG_BYTES: u64 = 192 << 20;
 
 /// Largest float map accepted: 4 bytes per pixel, and room for a header.
-const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
+const MAX_PFM_BYTES: u64 = 4 * MAX_PIXELS + 4096;
 
 /// Part of a JPEG that has its EXIF: a segment of 64 KiB, after those of JFIF and other small ones.
 const MAX_EXIF_START_BYTES: u64 = 256 << 10;
@@ -39,8 +39,8 @@ const MAX_EXIF_START_BYTES: u64 = 256 << 10;
 /// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
 
-/// Memory limit for other files with their pixels: enough for 8192 x 8192 pixels of four 16-bit channels.
-const MAX_DECODER_BYTES: u64 = 576 << 20;
+/// Memory limit for other files with their pixels: enough for [`MAX_PIXELS`] of four 16-bit channels.
+const MAX_DECODER_BYTES: u64 = 8 * MAX_PIXELS + (64 << 20);
 
 /// A picture whose header was read.
 pub(super) enum EncodedPicture<'a> {
@@ -302,15 +302,6 @@ fn sample_format(color: ColorType) -> SampleFormat {
     SampleFormat { channels: usize::from(color.channel_count()), is_16bit }
 }
 
-/// Returns the fault of a file that cannot be opened.
-pub(super) fn open_fault(error: std::io::Error) -> PictureFault {
-    match error.kind() {
-        ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
-        ErrorKind::InvalidInput => PictureFault::NotAFile,
-        _ => PictureFault::Io(error),
-    }
-}
-
 fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
     let bytes = file.metadata()?.len();
     if bytes > max_bytes {
@@ -323,7 +314,8 @@ fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Resu
 }
 
 pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
-    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+    let pixels = u64::from(width) * u64::from(height);
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX || pixels > MAX_PIXELS {
         Err(PictureFault::TooLarge { width, height })
     } else if width == 0 || height == 0 {
         Err(PictureFault::NoPixel { width, height })
@@ -340,23 +332,4 @@ fn create_png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, Pictu
     let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
     check_size(width, height)?;
     Ok(decoder)
-}
-
-pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {
-    match error {
-        png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => damaged_fault(&other),
-    }
-}
-
-fn decoder_fault(error: ImageError) -> PictureFault {
-    match error {
-        ImageError::Unsupported(error) => PictureFault::Unsupported(error.to_string().replace('\n', " ")),
-        ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => damaged_fault(&other),
-    }
-}
-
-fn damaged_fault(error: &dyn std::error::Error) -> PictureFault {
-    PictureFault::Damaged(error.to_string().replace('\n', " "))
 }

@@ -7,6 +7,7 @@ use super::contents::PictureSource;
 use super::decode::Scratch;
 use super::error::RecordingError;
 use super::fault::PictureFault;
+use super::{mcap, record3d};
 use crate::frame::{ColorImage, DepthMap};
 
 /// The pictures of such a recording, by the number of their frame, which must exist. Several threads may read at once.
@@ -48,4 +49,9 @@ pub(super) fn read_first_size<'a>(
         }
     }
     Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: file.to_owned() }))
+}
+
+/// Returns whether a file is a recording by itself.
+pub fn is_recording_file(path: &Path) -> bool {
+    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT].iter().any(|layout| (layout.matches)(path))
 }

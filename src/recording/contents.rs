@@ -24,6 +24,13 @@ pub(super) struct Layout {
     pub(super) open: fn(&RecordingFolder, &Options) -> Result<Contents, RecordingError>,
 }
 
+impl Layout {
+    /// Returns the files that identify it, and its name, for messages.
+    pub(super) fn describe_files(&self) -> String {
+        format!("{} ({})", self.expected_files, self.name)
+    }
+}
+
 /// The content of a recording.
 #[derive(Debug, Default)]
 pub(super) struct Contents {

@@ -8,7 +8,7 @@ use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{self, DISPARITY_SCALE, MapUnit};
-use super::{jpeg, xmp};
+use super::{jpeg, jpeg_intervals, xmp};
 use crate::color::round_to_8bit;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
@@ -106,15 +106,17 @@ pub(super) fn encode_photo_png(
 
 /// Appends a picture to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP. It has no alpha.
 pub(super) fn encode_photo_jpeg(raster: &Raster, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
-    let mut encoder = JpegEncoder::new_with_quality(&mut *file, JPEG_QUALITY);
-    if let Some(profile) = &metadata.icc_profile {
-        encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
-    }
-    if let Some(exif) = &metadata.exif {
-        encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
-    }
-    let (samples, color) = raster.to_8bit();
-    encoder.write_image(&samples, raster.size.0, raster.size.1, color)?;
+    let set_metadata = |encoder: &mut JpegEncoder<&mut Vec<u8>>| {
+        if let Some(profile) = &metadata.icc_profile {
+            encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
+        }
+        if let Some(exif) = &metadata.exif {
+            encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
+        }
+        Ok(())
+    };
+    let (rgb, _) = raster.to_8bit();
+    jpeg_intervals::encode(&rgb, raster.size, JPEG_QUALITY, set_metadata, file)?;
     if let Some(packet) = &metadata.xmp {
         jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }

@@ -1,9 +1,11 @@
 //! Faults in lines of lists, in calibrations, and in pictures, without their location.
 
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
-use super::MAX_SIDE_PX;
+use image::ImageError;
+
+use super::{MAX_PIXELS, MAX_SIDE_PX};
 
 /// A fault in a line of a list.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -116,7 +118,10 @@ pub enum PictureFault {
     #[error("it has a form that is not read ({0}); convert it to PNG")]
     Unsupported(String),
     /// The header states more pixels than are supported.
-    #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
+    #[error(
+        "its header claims {width}x{height} pixels, and at most {MAX_SIDE_PX} a side and {} megapixels are read; scale it \
+         down", MAX_PIXELS / 1_000_000
+    )]
     TooLarge { width: u32, height: u32 },
     /// The file is larger than any supported picture.
     #[error("the file has {bytes} bytes, and at most {max_bytes} are read; convert it")]
@@ -240,4 +245,32 @@ pub enum PictureFault {
         kind: &'static str,
         what: String,
     },
+}
+
+/// Returns the fault of a file that cannot be opened.
+pub(super) fn open_fault(error: io::Error) -> PictureFault {
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
+        ErrorKind::InvalidInput => PictureFault::NotAFile,
+        _ => PictureFault::Io(error),
+    }
+}
+
+pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {
+    match error {
+        png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => damaged_fault(&other),
+    }
+}
+
+pub(super) fn decoder_fault(error: ImageError) -> PictureFault {
+    match error {
+        ImageError::Unsupported(error) => PictureFault::Unsupported(error.to_string().replace('\n', " ")),
+        ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => damaged_fault(&other),
+    }
+}
+
+fn damaged_fault(error: &dyn std::error::Error) -> PictureFault {
+    PictureFault::Damaged(error.to_string().replace('\n', " "))
 }

@@ -71,6 +71,27 @@ pub(super) fn insert_application_segment(file: &mut Vec<u8>, number: u8, content
     file.splice(at..at, [0xFF, 0xE0 | number, high, low].into_iter().chain(content.iter().copied()));
 }
 
+/// Returns the place of the coded data after the header of its scan (SOS) in a JPEG as the encoder writes it.
+pub(super) fn find_coded_data(file: &[u8]) -> usize {
+    let last = segments(file).last().map_or(2, |(_, start, content)| start + content.len());
+    // The header of the scan follows the other segments; its length includes its own two bytes.
+    let length = file.get(last + 2..).and_then(<[u8]>::first_chunk).map_or(0, |bytes| u16::from_be_bytes(*bytes));
+    last + 2 + usize::from(length)
+}
+
+/// Changes the height in the frame header of a JPEG as the encoder writes it, and adds the number of blocks between two
+/// restart markers.
+pub(super) fn set_height_and_restart_interval(file: &mut Vec<u8>, height: u16, blocks: u16) {
+    let frame = segments(file).find_map(|(marker, start, _)| (marker == 0xC0).then_some(start));
+    let scan = segments(file).last().map(|(_, start, content)| start + content.len());
+    if let (Some(frame), Some(scan)) = (frame, scan) {
+        // The precision comes before the height.
+        file[frame + 1..frame + 3].copy_from_slice(&height.to_be_bytes());
+        let [high, low] = blocks.to_be_bytes();
+        file.splice(scan..scan, [0xFF, 0xDD, 0, 4, high, low]);
+    }
+}
+
 /// Returns the segments of a JPEG before its coded data: marker, position of the content in the file, and content. Ends
 /// where the file is damaged.
 pub(super) fn segments(file: &[u8]) -> impl Iterator<Item = (u8, usize, &[u8])> {

@@ -28,6 +28,7 @@ mod frame_sequence;
 mod heif;
 mod icc;
 mod jpeg;
+mod jpeg_intervals;
 mod kitti;
 mod list;
 pub mod map_sequence;
@@ -51,11 +52,13 @@ mod xmp;
 
 use std::path::Path;
 
+pub use container::is_recording_file;
 pub use decode::Scratch;
 pub use depth_file::{DepthUnit, covers as depth_covers};
 pub use error::RecordingError;
 pub use fault::{GeometryFault, LineFault, PictureFault};
 pub use options::Options;
+use options::check_depth_scale;
 pub use photo::Photo;
 pub use photo_metadata::PhotoMetadata;
 pub use writer::RecordingWriter;
@@ -79,8 +82,10 @@ const LAYOUTS: [Layout; 8] = [
 ];
 
 /// Maximum width and height; larger pictures are rejected by their header, before memory is allocated. Reading the
-/// largest takes at most four times the 192 MiB of its RGB.
-const MAX_SIDE_PX: u32 = 8192;
+/// largest takes at most four times the 343 MiB of its RGB.
+const MAX_SIDE_PX: u32 = 16384;
+/// Maximum number of pixels: cameras have up to 102 megapixels.
+const MAX_PIXELS: u64 = 120_000_000;
 
 /// Counts of listed pictures that belong to no frame, because no counterpart is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,8 +156,10 @@ impl Recording {
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
         let mut folder =
             RecordingFolder { dir: dir.to_owned(), root, maps_root: None, follow_links: options.follow_links };
-        let not_a_recording =
-            || RecordingError::NotARecording { dir: dir.to_owned(), expected_files: describe_expected_files() };
+        let not_a_recording = || RecordingError::NotARecording {
+            dir: dir.to_owned(),
+            expected_files: LAYOUTS.map(|layout| layout.describe_files()).join(", "),
+        };
         let (layout, contents) = match pattern_folder {
             Some(_) => (&pictures::LAYOUT, pictures::open_pattern(&folder, path, options)?),
             None => {
@@ -339,18 +346,4 @@ impl Recording {
     fn frame(&self, index: usize) -> Result<&Frame, RecordingError> {
         self.frames.get(index).ok_or(RecordingError::NoSuchFrame { index, len: self.frames.len() })
     }
-}
-
-/// Returns whether a file is a recording by itself.
-pub fn is_recording_file(path: &Path) -> bool {
-    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT].iter().any(|layout| (layout.matches)(path))
-}
-
-/// Returns the files that identify each layout, for messages.
-fn describe_expected_files() -> String {
-    LAYOUTS.map(|layout| format!("{} ({})", layout.expected_files, layout.name)).join(", ")
-}
-
-fn check_depth_scale(depth_scale: f32) -> Result<(), RecordingError> {
-    if depth_scale > 0.0 && depth_scale.is_finite() { Ok(()) } else { Err(RecordingError::DepthScale(depth_scale)) }
 }

@@ -1,6 +1,6 @@
 //! How recordings are read.
 
-use super::DepthUnit;
+use super::{DepthUnit, RecordingError};
 
 /// Options for reading a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,4 +44,8 @@ impl Default for Options {
             keep_going: false,
         }
     }
+}
+
+pub(super) fn check_depth_scale(depth_scale: f32) -> Result<(), RecordingError> {
+    if depth_scale > 0.0 && depth_scale.is_finite() { Ok(()) } else { Err(RecordingError::DepthScale(depth_scale)) }
 }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use super::coded;
 use super::error::RecordingError;
 use super::fault::PictureFault;
+use super::fault::png_fault;
 use super::still::{write_color, write_depth};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap};
@@ -121,7 +122,7 @@ fn parse_settings(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
 /// Reads the settings from a PNG as text. Other programs may have rewritten the iTXt chunk as tEXt or zTXt.
 fn read_text(path: &Path) -> Result<String, PictureFault> {
     let info = coded::read_png_info(path)?;
-    let fault = coded::png_fault;
+    let fault = png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
         return chunk.get_text().map_err(fault);
     }

@@ -24,7 +24,7 @@ use crate::names;
 use crate::optics::StereoRig;
 
 /// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
-/// transparency ignored, 16 bits are rounded to 8. At most 8192 x 8192 pixels.
+/// transparency ignored, 16 bits are rounded to 8. At most 16384 pixels a side, and 120 megapixels.
 ///
 /// # Errors
 /// The file is missing, not a PNG or JPEG, too large, truncated or damaged.
@@ -118,7 +118,7 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
 }
 
 /// Reads a disparity map in pixels from a file of floats, or from a 16-bit grey PNG of 256 units per pixel, where 0 is
-/// unknown (KITTI). At most 8192 x 8192 pixels.
+/// unknown (KITTI). At most 16384 pixels a side, and 120 megapixels.
 ///
 /// # Errors
 /// Same as for [`read_depth`].
@@ -127,7 +127,7 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
 }
 
 /// Reads a PNG or JPEG as width, height and grey values, row-major, 0 to 1 as stored (not linearised): luma for a
-/// colour picture, multiplied by alpha. At most 8192 x 8192 pixels.
+/// colour picture, multiplied by alpha. At most 16384 pixels a side, and 120 megapixels.
 ///
 /// # Errors
 /// Same as for [`read_color`].

@@ -121,7 +121,7 @@ pub struct Findings {
     /// The focus that a photo was taken with, which replaces `auto`.
     pub focus: Option<FocusRule>,
     /// The sharp original inside a photo, which is then the picture.
-    pub original: Option<ColorImage>,
+    pub original: Option<Arc<ColorImage>>,
     /// Whether the depth of a photo fits it already.
     pub is_fitting: bool,
     /// The file names of a recording's pictures, without extension.
@@ -155,6 +155,8 @@ struct OpenRequest<'a> {
     options: &'a Options,
     /// The look that the depth is for; `None` if depth is wanted as such, for example to record it.
     look: Option<&'a Look>,
+    /// The picture of a photo, if it is decoded already.
+    photo: Option<Arc<ColorImage>>,
 }
 
 /// Part of the message that rejects metres for relative inverse depth.
@@ -170,14 +172,17 @@ impl Source {
     /// # Errors
     /// The source cannot be read, has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
-        let request = OpenRequest { options, look };
-        let source = Self::open_with_own_depth(name, &request)?;
+        Self::open_requested(name, &OpenRequest { options, look, photo: None })
+    }
+
+    fn open_requested(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
+        let source = Self::open_with_own_depth(name, request)?;
         // Before networks and plates, which then see the pictures as people do.
-        let transform = SourceTransform::new(options.frames.orientation, &source);
+        let transform = SourceTransform::new(request.options.frames.orientation, &source);
         let source = transform.apply_to_source(source)?;
-        let source = networks::add_network_depth(source, &request);
-        let source = external_depth::add_external_depth(source, (name, &transform), &request, &Clock::system())?;
-        Ok(networks::add_person_detection(source, &request))
+        let source = networks::add_network_depth(source, request);
+        let source = external_depth::add_external_depth(source, (name, &transform), request, &Clock::system())?;
+        Ok(networks::add_person_detection(source, request))
     }
 
     /// Creates a source from a camera that the caller has opened; `depth` provides depth in metres for its frames.
@@ -322,8 +327,9 @@ impl OpenRequest<'_> {
 
     fn check_effect(&self) -> Result<(), SourceError> {
         if self.options.depth_choice == DepthChoice::Stereo && !self.uses_depth() {
-            let what = "--depth stereo: only --effect dof uses depth; leave --depth or --effect out";
-            return Err(SourceError::Usage(what.to_string()));
+            return SourceError::usage_error(
+                "--depth stereo: only --effect dof uses depth; leave --depth or --effect out",
+            );
         }
         Ok(())
     }

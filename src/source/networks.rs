@@ -121,7 +121,9 @@ pub(super) fn add_person_detection(mut source: Source, request: &OpenRequest) ->
 /// Detects the person in focus for the map of a single picture from a file.
 pub fn find_person(options: &Options, look: &Look, color: &ColorImage, map: &mut DepthMap) {
     let is_used = look.effect.follows_depth() && look.focus == FocusRule::Auto;
-    if is_used && let Some((mut persons, _)) = open_person_detector(&OpenRequest { options, look: Some(look) }) {
+    if is_used
+        && let Some((mut persons, _)) = open_person_detector(&OpenRequest { options, look: Some(look), photo: None })
+    {
         let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
         persons.set_person_distance(FrameInput { stamp, color, right: None }, map);
     }

@@ -103,8 +103,7 @@ impl Opened {
                 })
             }
             SourceName::Photo(path) => {
-                let photo::ReadPhoto { color, depth, depth_from, mut findings } =
-                    photo::read_photo(path, request.options)?;
+                let photo::ReadPhoto { color, depth, depth_from, mut findings } = photo::read_photo(path, request)?;
                 request.check_relative_depth(depth_from)?;
                 let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
                 findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());

@@ -1,5 +1,7 @@
 //! Turns, flips and cuts the pictures of a source, and all that is in their pixels.
 
+use std::sync::Arc;
+
 use super::options::Orientation;
 use super::{Source, SourceError};
 use crate::capture::CaptureError;
@@ -44,7 +46,7 @@ impl SourceTransform {
         findings.original = findings.original.map(|original| {
             let mut into = ColorImage::default();
             self.transform.apply_to_color(&original, &mut into);
-            into
+            Arc::new(into)
         });
         if let Some(FocusRule::Point { x, y }) = findings.focus {
             let point = self.transform.apply_to_point([x, y], self.own_px);

@@ -1,9 +1,10 @@
 //! Photos, and the depth files next to them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::options::Depth;
-use super::{DepthChoice, DepthOrigin, Findings, Options, Source, SourceError, SourceName};
+use super::{DepthChoice, DepthOrigin, Findings, OpenRequest, Options, Source, SourceError, SourceName};
 use crate::depth::FrameInput;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, Stamp};
@@ -50,18 +51,21 @@ pub struct PhotoDepth {
     pub focus: Option<FocusRule>,
 }
 
-/// Returns the default depth of the photo at `path` with the colours `color`, as [`Source::open`] finds it; and what was
-/// assumed or is wrong about it, a line each.
+/// Returns the default depth of the photo at `path` with the decoded picture `color`, as [`Source::open`] finds it; and
+/// what was assumed or is wrong about it, a line each.
 ///
 /// # Errors
 /// Same as for [`Source::open`].
 pub fn read_default_depth(
     path: &Path,
-    color: &ColorImage,
+    color: &Arc<ColorImage>,
     options: &Options,
     look: &Look,
 ) -> Result<(Option<PhotoDepth>, Vec<String>), SourceError> {
-    let mut source = Source::open(&SourceName::Photo(path.to_owned()), options, Some(look))?;
+    // A turned picture has to be read again: its depth is of the picture in the file.
+    let is_own = options.frames.orientation.transform().is_identity();
+    let request = OpenRequest { options, look: Some(look), photo: is_own.then(|| Arc::clone(color)) };
+    let mut source = Source::open_requested(&SourceName::Photo(path.to_owned()), &request)?;
     let measured = !source.depth_from.is_replaceable();
     let Findings { notes, depth_by, focus, original, .. } = std::mem::take(&mut source.findings);
     let Source { depth: Some(depth), depth_from: from, networks, .. } = &mut source else { return Ok((None, notes)) };
@@ -69,8 +73,11 @@ pub fn read_default_depth(
     let color = original.as_ref().unwrap_or(color);
     depth
         .read(FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None }, &mut map)?;
-    let by = networks.take().or(depth_by).unwrap_or_default();
-    Ok((Some(PhotoDepth { map, from: *from, measured, by, original, focus }), notes))
+    let (by, from) = (networks.take().or(depth_by).unwrap_or_default(), *from);
+    // The source shares the original.
+    drop(source);
+    let original = original.map(Arc::unwrap_or_clone);
+    Ok((Some(PhotoDepth { map, from, measured, by, original, focus }), notes))
 }
 
 /// Returns the files to read for a photo: the picture, and its depth file if there is one.
@@ -82,7 +89,7 @@ pub fn photo_files(path: &Path) -> impl Iterator<Item = PathBuf> {
 
 /// A photo, and its depth, if there is any.
 pub(super) struct ReadPhoto {
-    pub color: ColorImage,
+    pub color: Arc<ColorImage>,
     pub depth: Option<DepthMap>,
     pub depth_from: DepthOrigin,
     pub findings: Findings,
@@ -94,9 +101,9 @@ pub(super) struct ReadPhoto {
 ///
 /// # Errors
 /// The photo or its depth file is unreadable, or the depth does not fit it. Depth inside that cannot be read is a note.
-pub(super) fn read_photo(path: &Path, options: &Options) -> Result<ReadPhoto, SourceError> {
-    let path = &original_path(path);
-    let color = still::read_color(path)?;
+pub(super) fn read_photo(path: &Path, request: &OpenRequest) -> Result<ReadPhoto, SourceError> {
+    let (path, options) = (&original_path(path), request.options);
+    let color = request.photo.clone().map_or_else(|| still::read_color(path).map(Arc::new), Ok)?;
     let depth_from = DepthOrigin::Nothing;
     let mut photo = ReadPhoto { color, depth: None, depth_from, findings: Findings::default() };
     if !matches!(options.depth_choice, DepthChoice::Auto | DepthChoice::Recorded) {
@@ -127,8 +134,8 @@ impl ReadPhoto {
         (self.depth_from, self.depth) = (depth.distances.into(), Some(depth.map));
         if let Some(original) = original {
             findings.notes.push(format!("{name}: the original before the phone's own blur is inside, and is used"));
-            self.color = original.clone();
-            findings.original = Some(original);
+            self.color = Arc::new(original);
+            findings.original = Some(Arc::clone(&self.color));
         }
         findings.focus = focus.map(|focus| match focus {
             Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },

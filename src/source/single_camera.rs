@@ -60,7 +60,7 @@ pub fn compute_picture_depth(
     color: &ColorImage,
 ) -> Result<DepthMap, SourceError> {
     reject_metric_look(look, "one picture gives")?;
-    let request = OpenRequest { options, look: Some(look) };
+    let request = OpenRequest { options, look: Some(look), photo: None };
     let seen = FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None };
     let networks = chosen
         .has_networks()

@@ -9,6 +9,7 @@ mod on_gpu;
 #[path = "../common/portrait.rs"]
 mod portrait;
 
+mod banded;
 mod ladder;
 mod laws;
 mod laws_random;

@@ -33,6 +33,8 @@ pub struct Strip<'a> {
     pub size: (usize, usize),
     /// What must be made anew; `None` is everything.
     pub units: Option<&'a Units>,
+    /// Rows of the picture whose result is wanted.
+    pub wanted_px: Range<usize>,
     /// Pixels of the picture per bin pixel and axis.
     pub scale: usize,
     /// The coarse grid with the bin's coverage.
@@ -137,7 +139,9 @@ impl Strip<'_> {
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
             let rows_px = y * row_px..(y + 1) * row_px;
-            if self.units.is_some_and(|units| !units.any_changed(columns_px.clone(), rows_px)) {
+            // Between bin pixels the result is interpolated: a row of cells more is read on either side.
+            let is_wanted = y * row_px < self.wanted_px.end + row_px && self.wanted_px.start < (y + 2) * row_px;
+            if !is_wanted || self.units.is_some_and(|units| !units.any_changed(columns_px.clone(), rows_px)) {
                 made.push(false);
                 continue;
             }

@@ -4,8 +4,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use pulp::Arch;
+
 use super::encode::{EncodeTable, Encoder};
 use super::{CpuBokeh, Radii, Sample};
+use crate::bokeh::plan::Plan;
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::color::Picture16;
 use crate::compute::{Backend, simd};
@@ -24,7 +27,7 @@ impl CpuBokeh {
         coc: &CocField,
         out: &mut ColorImage,
     ) -> Result<PassTimes, BokehError> {
-        self.check_frame(color.size(), depth, coc)?;
+        check_frame(&self.plan, color.size(), depth, coc)?;
         out.resize(color.width, color.height);
         Ok(self.blur_timed(&color.rgb, Radii::Field(coc, depth), &mut out.rgb))
     }
@@ -39,22 +42,11 @@ impl CpuBokeh {
         depth: Option<&DepthMap>,
         coc: &CocField,
     ) -> Result<Picture16, BokehError> {
-        self.check_frame(picture.size(), depth, coc)?;
-        self.encoder = Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) });
+        check_frame(&self.plan, picture.size(), depth, coc)?;
+        self.encoder = create_encoder(picture);
         let mut out = Picture16::new(picture.size(), picture.curves.clone());
         self.blur_timed(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb);
         Ok(out)
-    }
-
-    fn check_frame(&self, got: (u32, u32), depth: Option<&DepthMap>, coc: &CocField) -> Result<(), BokehError> {
-        let made_for = (self.plan.width as u32, self.plan.height as u32);
-        if got != made_for {
-            return Err(BokehError::Size { made_for, got });
-        }
-        match (coc, depth) {
-            (CocField::Depth(_), None) => Err(BokehError::NoDepth),
-            _ => Ok(()),
-        }
     }
 
     fn blur_timed<T: Sample>(&mut self, pixels: &[T], coc: Radii<'_>, out: &mut [T]) -> PassTimes {
@@ -98,6 +90,33 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::instruction_set(self.arch))
+        describe(self.workers.thread_count(), self.arch)
     }
+}
+
+/// Refuses a picture of another size than the plan's, and one without the depth that `coc` needs.
+pub(super) fn check_frame(
+    plan: &Plan,
+    got: (u32, u32),
+    depth: Option<&DepthMap>,
+    coc: &CocField,
+) -> Result<(), BokehError> {
+    let made_for = (plan.width as u32, plan.height as u32);
+    if got != made_for {
+        return Err(BokehError::Size { made_for, got });
+    }
+    match (coc, depth) {
+        (CocField::Depth(_), None) => Err(BokehError::NoDepth),
+        _ => Ok(()),
+    }
+}
+
+/// Creates the encoder for results of `picture`.
+pub(super) fn create_encoder(picture: &Picture16) -> Arc<Encoder> {
+    Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) })
+}
+
+/// Describes the executor in one line.
+pub(super) fn describe(threads: usize, arch: Arch) -> String {
+    format!("cpu, {threads} threads, {}", simd::instruction_set(arch))
 }

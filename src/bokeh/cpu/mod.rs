@@ -1,6 +1,7 @@
 //! The CPU executor: uses every core and the best vector instructions available, and allocates nothing per frame.
 
 mod band;
+mod banded;
 mod bin;
 mod bin_parts;
 mod blur;
@@ -42,13 +43,17 @@ use silhouettes::Silhouettes;
 use tiles::{BLOCK, Tiles};
 use unpack::InputFrame;
 
-use super::BlurredFrame;
 use super::ladder::Compositing;
 use super::plan::{CELL, Plan};
 use super::reuse::CONTENT_BIN_W;
+use super::{BlurredFrame, Bokeh, BokehError};
 use crate::budget::Quality;
+use crate::color::Picture16;
 use crate::compute::thread_pool::{ThreadPool, core_count};
+use crate::frame::DepthMap;
+use crate::optics::CocField;
 
+pub use banded::{BandedBokeh, MAX_WHOLE_PIXELS};
 pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compression_factor, expansion_factor};
 
@@ -76,6 +81,34 @@ pub struct CpuBokeh {
     done: Option<BlurredFrame>,
     /// Fraction of the last frame that was kept from earlier ones.
     kept_fraction: f32,
+}
+
+/// Creates an executor of `plan` on `threads` threads (all cores when `None`): in bands of rows for large pictures.
+pub fn create(plan: Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
+    match plan.width * plan.height > MAX_WHOLE_PIXELS {
+        true => Box::new(BandedBokeh::new(plan, threads)),
+        false => Box::new(CpuBokeh::new(plan, threads)),
+    }
+}
+
+/// Blurs one picture of 16-bit codes in linear light of its tone curves, in bands of rows if it is large; returns it with
+/// a description of the executor.
+///
+/// # Errors
+/// The picture and the plan have different sizes, or `coc` needs depth and it is missing.
+pub fn blur_16bit(
+    plan: Plan,
+    threads: Option<usize>,
+    picture: &Picture16,
+    depth: Option<&DepthMap>,
+    coc: &CocField,
+) -> Result<(Picture16, String), BokehError> {
+    if plan.width * plan.height > banded::MAX_WHOLE_PIXELS {
+        let mut executor = BandedBokeh::new(plan, threads);
+        return Ok((executor.blur_16bit(picture, depth, coc)?, executor.describe()));
+    }
+    let mut executor = CpuBokeh::new(plan, threads);
+    Ok((executor.blur_16bit(picture, depth, coc)?, executor.describe()))
 }
 
 /// Scratch memory of one thread.

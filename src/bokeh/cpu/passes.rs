@@ -119,7 +119,11 @@ impl CpuBokeh {
                 source: *frame,
                 tiles,
                 rows: band * rows..(band + 1) * rows,
-                bins: std::array::from_fn(|k| bin_parts[k].as_ref().map(|bin_part| bin_part.part(band))),
+                bins: std::array::from_fn(|k| {
+                    let bin_part = bin_parts[k].as_ref()?;
+                    let needed = plan.content_rows(&plan.bins[k]);
+                    (band * rows < needed.end && needed.start < (band + 1) * rows).then(|| bin_part.part(band))
+                }),
                 inpainting,
                 kept,
                 first_pending: first_pending.part(band),
@@ -166,6 +170,7 @@ impl CpuBokeh {
                 source: strip_part.source,
                 size: (bin.width, bin.height),
                 units: units.filter(|_| is_kept(bin)),
+                wanted_px: plan.wanted_rows(),
                 scale: bin.scale,
                 cells: strip_part.cells,
                 edges: strip_part.edges,
@@ -198,7 +203,10 @@ impl CpuBokeh {
             &mut self.thread_scratch,
             plan.height.div_ceil(TILE_H),
             &|thread: &mut ThreadScratch, part| {
-                let (y0, layers) = (part * TILE_H, &mut thread.layers);
+                let (y0, layers, wanted) = (part * TILE_H, &mut thread.layers, plan.wanted_rows());
+                if y0 >= wanted.end || y0 + TILE_H <= wanted.start {
+                    return;
+                }
                 let out = out.part(part);
                 let held = held.as_ref().map(|rows| rows.part(part));
                 arch.dispatch(Composite {

@@ -39,7 +39,7 @@ pub enum Radii<'a> {
 }
 
 /// Type of a colour sample.
-pub trait Sample: Copy + Send + Sync {
+pub trait Sample: Default + Copy + Send + Sync {
     /// Wraps samples as pixels of their kind, which the encoder belongs to.
     fn as_pixels<'a>(samples: &'a [Self], encoder: &'a Encoder) -> Pixels<'a>;
 

@@ -22,6 +22,7 @@ use super::tiles::{self, Tiles};
 use super::votes::{self, RADIUS_LANES, Votes, Weights, depth_step_at};
 use crate::compute::bands::{self, Bands};
 use crate::compute::thread_pool::ThreadPool;
+use crate::frame::{reset_buffer, resize_buffer};
 
 /// Weight of a depth within the band, and of one that was filled in.
 pub const UNCERTAIN: f32 = 0.12;
@@ -90,10 +91,8 @@ impl Aligner {
         for round in 0..ROUNDS {
             let Self { planes, edge, band, scratch, tiles, spatial_weights, worklist, results, pixels, moved } = self;
             if round == 0 {
-                for mask in [&mut *edge, &mut *band, &mut *scratch] {
-                    mask.clear();
-                    mask.resize(inverse.len(), false);
-                }
+                resize_buffer(edge, inverse.len());
+                [&mut *band, &mut *scratch].into_iter().for_each(|mask| reset_buffer(mask, inverse.len()));
                 tiles.clear(width, height);
                 let parts = bands.rows().zip(bands.split(edge, width)).zip(tiles.split(bands));
                 workers.run_each(parts, &|((rows, edge), has_edge)| {

@@ -39,7 +39,7 @@ use crate::compute::thread_pool::ThreadPool;
 use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Letterbox;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, reset_buffer};
 use crate::link::pool::Pooled;
 
 /// Minimum depth step of an edge in inverse depth: 0.6 px of CoC at a radius of 10 px at infinity; smaller steps are
@@ -89,6 +89,8 @@ pub struct Refiner {
     /// The downsampled picture.
     reduced: ColorImage,
     fit: Letterbox,
+    /// Whether no frame follows another, so that nothing is kept of them.
+    single: bool,
     /// Refines instead of the CPU, until the device fails.
     #[cfg(feature = "gpu")]
     gpu: WithFallback<Option<gpu::GpuRefiner>>,
@@ -114,6 +116,12 @@ impl Refiner {
     pub fn with_correction(correction: MapCorrection) -> Self {
         let coarsest = correction.coarsest.clamp(1, 1 << 5).next_power_of_two();
         Self { correction: MapCorrection { coarsest, ..correction }, ..Self::default() }
+    }
+
+    /// Refines single pictures if `single`, each on its own: keeps nothing of them, which saves memory.
+    #[must_use]
+    pub fn for_single_pictures(self, single: bool) -> Self {
+        Self { single, ..self }
     }
 
     /// Moves refinement to `device` if it passes its self-test and maps need no correction. When it fails, the CPU
@@ -209,11 +217,11 @@ impl Refiner {
             self.reduced = reduced;
             scale /= 2;
         }
-        self.refine_at_scale(workers, map, color, distance_px, Some(time_ns));
+        self.refine_at_scale(workers, map, color, distance_px, Some(time_ns).filter(|_| !self.single));
     }
 
     /// Refines `map` at the size of `color`, after moving its outlines. The temporal filter runs only with a `time_ns`:
-    /// at full scale.
+    /// at full scale, in a stream.
     fn refine_at_scale(
         &mut self,
         workers: &mut ThreadPool,
@@ -222,7 +230,7 @@ impl Refiner {
         distance_px: i32,
         time_ns: Option<u64>,
     ) {
-        self.upsampler.resize(map, color.size());
+        self.upsampler.resize(workers, map, color.size());
         let is_good = self.filler.fill_without_storing(map, color);
         // The filler fills all holes or none: the first pixel shows which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
@@ -233,12 +241,11 @@ impl Refiner {
         } = self;
         let (arch, width, focus_m) = (*arch, map.width as usize, focus.0);
         let size = (width, map.height as usize);
-        unknown.clear();
-        unknown.resize(map.metres.len(), false);
+        reset_buffer(unknown, map.metres.len());
         filler.holes().iter().for_each(|hole| unknown[hole.pixels(width)].fill(true));
         let measured_noise = noise_estimator.estimate(|at| focus_m / map.metres[at], |at| unknown[at], size);
         smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
-        if is_good {
+        if is_good && !self.single {
             filler.store_by_swap(map);
         }
         let noise = noise_estimator.estimate(|at| inverse[at], |at| unknown[at], size);

@@ -7,6 +7,7 @@ use pulp::WithSimd;
 
 use super::tiles::Tiles;
 use crate::compute::bands::Bands;
+use crate::frame::reset_buffer;
 
 /// Values that a window reads from a row.
 pub const LANES: usize = 16;
@@ -39,14 +40,8 @@ impl Planes {
         if (self.width, self.height) != (width, height) {
             (self.width, self.height, self.stride) = (width, height, width.div_ceil(2) + 2 * MARGIN);
             let count = 2 * self.stride * height;
-            for plane in &mut self.depths {
-                plane.clear();
-                plane.resize(count, 0.0);
-            }
-            for plane in &mut self.colors {
-                plane.clear();
-                plane.resize(count, 0);
-            }
+            self.depths.iter_mut().for_each(|plane| reset_buffer(plane, count));
+            self.colors.iter_mut().for_each(|plane| reset_buffer(plane, count));
         }
         self.radius = radius;
     }

@@ -6,6 +6,8 @@
 //!
 //! twin: shaders/refine_prepare.wgsl
 
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
 use crate::depth::tap::Tap;
 use crate::frame::DepthMap;
 
@@ -21,7 +23,7 @@ pub struct Upsampler {
 
 impl Upsampler {
     /// Resamples `map` to the size of its picture, in pixels; an empty map becomes unknown (0) everywhere.
-    pub fn resize(&mut self, map: &mut DepthMap, (width, height): (u32, u32)) {
+    pub fn resize(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, (width, height): (u32, u32)) {
         let (from_width, from_height) = (map.width as usize, map.height as usize);
         if map.metres.is_empty() || map.size() == (width, height) {
             return map.resize(width, height);
@@ -31,18 +33,22 @@ impl Upsampler {
         self.columns.clear();
         self.columns.extend((0..width as usize).map(|x| Tap::new(x, width as usize, from_width)));
         map.resize(width, height);
-        for (y, row) in map.metres.chunks_exact_mut(width as usize).enumerate() {
-            let Tap { first, second, weight: down_weight } = Tap::new(y, height as usize, from_height);
-            let above = &self.metres[first * from_width..][..from_width];
-            let below = &self.metres[second * from_width..][..from_width];
-            for (z_m, tap) in row.iter_mut().zip(&self.columns) {
-                *z_m = interpolate(
-                    [above[tap.first], above[tap.second], below[tap.first], below[tap.second]],
-                    tap.weight,
-                    down_weight,
-                );
+        let (Self { metres, columns }, width, height) = (&*self, width as usize, height as usize);
+        let bands = Bands::new(height, 1, workers);
+        workers.run_each(bands.rows().zip(bands.split(&mut map.metres, width)), &|(rows, out)| {
+            for (y, row) in rows.zip(out.chunks_exact_mut(width)) {
+                let Tap { first, second, weight: down_weight } = Tap::new(y, height, from_height);
+                let above = &metres[first * from_width..][..from_width];
+                let below = &metres[second * from_width..][..from_width];
+                for (z_m, tap) in row.iter_mut().zip(columns) {
+                    *z_m = interpolate(
+                        [above[tap.first], above[tap.second], below[tap.first], below[tap.second]],
+                        tap.weight,
+                        down_weight,
+                    );
+                }
             }
-        }
+        });
     }
 }
 

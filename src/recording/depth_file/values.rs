@@ -9,9 +9,9 @@ use image::{ImageBuffer, Luma, imageops};
 
 use super::{FORMATS, exr, npy, tiff};
 use crate::files::input;
-use crate::recording::MAX_SIDE_PX;
+use crate::recording::MAX_PIXELS;
 use crate::recording::coded::{self, EncodedPicture};
-use crate::recording::fault::PictureFault;
+use crate::recording::fault::{PictureFault, open_fault};
 use crate::recording::pfm;
 use crate::recording::photo_metadata::PhotoMetadata;
 use crate::recording::unit::{self, MapUnit};
@@ -62,11 +62,11 @@ impl Values {
 }
 
 /// Largest file of floats: 8 bytes per pixel, and room for a header.
-const MAX_FLOATS_BYTES: u64 = 8 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + (1 << 20);
+const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
 
 /// Reads a map; the first bytes decide its format.
 pub(super) fn read(path: &Path) -> Result<Values, PictureFault> {
-    let mut file = input::open(path).map_err(coded::open_fault)?;
+    let mut file = input::open(path).map_err(open_fault)?;
     let mut start = [0; 8];
     let mut length = 0;
     while let read @ 1.. = file.read(&mut start[length..])? {

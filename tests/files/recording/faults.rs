@@ -250,9 +250,11 @@ fn damage_is_told() {
 #[test]
 fn a_bomb_is_refused_from_its_header() {
     let scene = Scene::with_pairs(3);
-    for (width, height) in [(8193, 1), (1, 8193), (1 << 20, 1 << 20), (i32::MAX as u32, i32::MAX as u32)] {
+    let sides = [(16385, 1), (1, 16385), (11000, 11000), (65535, 65535), (1 << 20, 1 << 20), (i32::MAX as u32, 3)];
+    for (width, height) in sides {
         scene.write("rgb/1.png", png_that_claims(width, height));
-        assert_color_fault(&scene, &format!("claims {width}x{height} pixels"));
+        let what = "and at most 16384 a side and 120 megapixels are read; scale it down";
+        assert_color_fault(&scene, &format!("claims {width}x{height} pixels, {what}"));
         scene.write("depth/1.png", png_that_claims(width, height));
         assert_depth_fault(&scene, &format!("claims {width}x{height} pixels"));
     }

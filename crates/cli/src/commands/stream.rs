@@ -52,11 +52,8 @@ Examples:
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
   bokehcam stream somewhere/clip.mp4 --to blurred.mp4
-  bokehcam stream demo --frames 90 --to out/
   bokehcam stream demo --frames 90 --to out.mp4 --aperture polygon:6 --focus 1.2
   bokehcam stream demo --to - --quiet --pace realtime | ffplay -
-  bokehcam stream somewhere/rgbd --loop --to /dev/video10 --out-size 1280x720
-  bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a

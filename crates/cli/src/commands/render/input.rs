@@ -1,6 +1,7 @@
 //! Input of `render`: the picture, and its depth, which is given, computed, or found in the photo.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::RenderCommand;
 use crate::error::CliError;
@@ -73,7 +74,9 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
 
 /// Finds the depth of a photo as a stream of it does: beside it, or by an installed network.
 fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut Input) -> Result<(), CliError> {
-    let (found, notes) = photo::read_default_depth(image, &input.photo.color, &command.source_options(), look)?;
+    let color = Arc::new(std::mem::take(&mut input.photo.color));
+    let (found, notes) = photo::read_default_depth(image, &color, &command.source_options(), look)?;
+    input.photo.color = Arc::unwrap_or_clone(color);
     notes.iter().for_each(|note| log::note(note));
     let Some(PhotoDepth { map, from, measured, by, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {

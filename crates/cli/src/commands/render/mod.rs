@@ -1,6 +1,7 @@
 //! `render`: blurs a still picture.
 
 mod batch;
+mod blur;
 mod debug;
 mod debug_pictures;
 mod input;
@@ -8,7 +9,6 @@ mod listing;
 mod map_folder;
 
 use std::fmt::Display;
-use std::mem;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
@@ -26,21 +26,18 @@ use crate::settings::look;
 use crate::settings::unused;
 use crate::settings::unused::FrameOrigin;
 use crate::terminal;
-use bokehcam::bokeh::BokehError;
 use bokehcam::compute::Backend;
-use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::misalignment::Misalignment;
-use bokehcam::engine;
-use bokehcam::engine::still::{Depth, Rendered};
+use bokehcam::engine::still::Depth;
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
 use bokehcam::names;
+use bokehcam::recording::snapshot;
 use bokehcam::recording::still::{self, PhotoFormat};
-use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
@@ -220,43 +217,13 @@ fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result
     let computing = command.computing.to_compute_options();
     let executor = match &command.debug_dir {
         Some(dir) => debug::blur_and_dump(&mut photo, depth, &look, &computing, (dir, command.output.force))?,
-        None => blur(&mut photo, depth, &look, &computing)?,
+        None => blur::blur(&mut photo, depth, &look, &computing)?,
     };
     let lost = photo.write(&command.out, command.output.force)?;
     if !lost.is_empty() {
         log::note(&format!("not in {}: {}", command.out.display(), lost.join(", ")));
     }
     Ok(RenderedFile { executor, depth_by: found.map(|found| found.by) })
-}
-
-/// Blurs a photo; returns a description of the executor.
-fn blur(
-    photo: &mut Photo,
-    depth: Option<Depth>,
-    look: &Look,
-    computing: &ComputeOptions,
-) -> Result<String, BokehError> {
-    let color = mem::take(&mut photo.color);
-    let is_transparent = look.background == Background::Transparent;
-    let Some(picture) = photo.codes.take_if(|_| !is_transparent) else {
-        if photo.is_16bit {
-            log::note("--behind transparent: what is blurred gets 8 bits; what is sharp keeps its 16");
-        }
-        let before = photo.codes.is_some().then(|| color.clone());
-        let Rendered { color, alpha, by } = engine::still::render_picture(look, color, depth, computing)?;
-        if let (Some(codes), Some(before)) = (&mut photo.codes, before) {
-            codes.take_changes(&before.rgb, &color.rgb);
-        }
-        photo.color = color;
-        alpha.iter().for_each(|alpha| photo.multiply_alpha(alpha));
-        return Ok(by);
-    };
-    if computing.backend == Backend::Gpu || computing.adapter.is_some() {
-        log::note("16 bits and tone curves other than sRGB's are blurred by the processor, not the GPU");
-    }
-    let (blurred, executor) = engine::still::blur_picture_16bit(look, color, picture, depth, computing.threads)?;
-    photo.codes = Some(blurred);
-    Ok(executor)
 }
 
 impl RenderCommand {
