@@ -43,17 +43,19 @@ pub fn compute_coc_and_depth(
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     reject_transparency(look)?;
-    prepare(look, color, depth, core_count()).map(|(field, map, _)| (field, map))
+    prepare(look, color, depth, core_count()).map(|Prepared { field, map, .. }| (field, map))
 }
 
-/// Does the same on `threads` threads, with bit-identical results, for any background; returns what is kept of the
-/// picture if that is transparent.
-fn prepare(
-    look: &Look,
-    color: &mut ColorImage,
-    depth: Option<Depth>,
-    threads: usize,
-) -> Result<(CocField, Option<DepthMap>, Option<Pooled<Kept>>), BokehError> {
+/// Everything that the blur needs besides the picture.
+struct Prepared {
+    field: CocField,
+    map: Option<DepthMap>,
+    /// What is kept of the picture, if the background is transparent.
+    kept: Option<Pooled<Kept>>,
+}
+
+/// Does the same as [`compute_coc_and_depth`] for any background, on `threads` threads, with bit-identical results.
+fn prepare(look: &Look, color: &mut ColorImage, depth: Option<Depth>, threads: usize) -> Result<Prepared, BokehError> {
     let (depth, mut map) = match depth {
         Some(Depth::Measured(map)) => (Origin::Single, Some(map)),
         Some(Depth::Final(map)) => (Origin::Finished, Some(map)),
@@ -63,7 +65,8 @@ fn prepare(
     let input = Input { size: color.size(), frames: Some(1), depth, knows_background: true, playback, threads };
     // A single picture is never cropped.
     let (field, composed) = Preprocessor::new(look, input).preprocess(color, map.as_mut(), 0)?;
-    Ok((field, map.filter(|_| matches!(field, CocField::Depth(_))), composed.kept))
+    let map = map.filter(|_| matches!(field, CocField::Depth(_)));
+    Ok(Prepared { field, map, kept: composed.kept })
 }
 
 /// Blurs the picture `color` as `look` says; returns it with a description of the executor. Effect `none` leaves it
@@ -96,7 +99,7 @@ pub fn render_picture(
     if look.coc_kind().is_none() {
         return Ok(Rendered { color, alpha: None, by: "not blurred".to_string() });
     }
-    let (coc, depth, kept) = prepare(look, &mut color, depth, computing.thread_count())?;
+    let Prepared { field: coc, map: depth, kept } = prepare(look, &mut color, depth, computing.thread_count())?;
     let (mut blur, mut images) = (Blur::default(), Images { color, depth, ..Images::default() });
     blur.set_look(look, (size, false), |settings| computing.create_blur(settings, size))?;
     blur.blur(&mut images, coc)?;

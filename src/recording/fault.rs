@@ -221,14 +221,14 @@ pub enum PictureFault {
     ColoredDepth,
     /// Colours of a known colour map stand for depth.
     #[error(
-        "it has the colours of {name}; add --depth-unit inverse if {near} is near, or --depth-unit inverse \
-         --depth-invert if {far} is near"
+        "it has the colours of {name}; add --depth-unit inverse if {} is near, or --depth-unit inverse \
+         --depth-invert if {} is near", ends[0], ends[1]
     )]
     ColorMapped {
         /// The name of the colour map.
         name: &'static str,
-        near: &'static str,
-        far: &'static str,
+        /// The colours that are usually near and far.
+        ends: Box<[&'static str; 2]>,
     },
     /// The picture is not a depth map.
     #[error(

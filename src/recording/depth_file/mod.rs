@@ -119,7 +119,7 @@ fn read_values(path: &Path, options: &Options) -> Result<(Values, Option<String>
             let near = if options.invert { far } else { near };
             Ok((values, Some(format!("has the colours of {name}, of which {near} is taken as near"))))
         }
-        false => Err(PictureFault::ColorMapped { name, near, far }),
+        false => Err(PictureFault::ColorMapped { name, ends: Box::new([near, far]) }),
     }
 }
 

@@ -73,7 +73,7 @@ impl<W: Write> RawVideo<W> {
         match &mut self.converter {
             Some(converter) => converter.append_planes(frame, &mut self.bytes),
             None => {
-                let opaque = std::iter::repeat(&u8::MAX).take(if alpha.is_empty() { width * height } else { 0 });
+                let opaque = std::iter::repeat_n(&u8::MAX, if alpha.is_empty() { width * height } else { 0 });
                 interleave_alpha(frame, alpha.iter().chain(opaque), &mut self.rgba);
                 self.bytes.extend_from_slice(&self.rgba);
             }

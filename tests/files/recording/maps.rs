@@ -79,7 +79,7 @@ fn a_wrong_pfm_is_told() {
     let dir = TempDir::new().unwrap();
     for (content, says) in [
         (&b"PF\n1 1\n-1\n0123456789ab"[..], "a colour PFM is not depth"),
-        (b"Pf\n9999 9999\n-1\n", "claims 9999x9999"),
+        (b"Pf\n19999 19999\n-1\n", "claims 19999x19999"),
         (b"Pf\n0 4\n-1\n", "no pixel"),
         (b"Pf\n-1 4\n-1\n", "\"-1\" in its header is not a number"),
         (b"Pf\n1 \xff\n-1\n", "not text"),

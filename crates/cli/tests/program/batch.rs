@@ -151,7 +151,7 @@ fn what_cannot_be_for_many_is_refused_before_anything_is_written() {
         (&["shots", "--depth-map", "shots/a-depth.png"], "--depth-map shots/a-depth.png: for many pictures this is"),
         (&["shots", "--mask", "shots/b.png"], "--mask shots/b.png: for many pictures this is a folder"),
         (&["shots", "--depth", "stereo"], "--depth stereo: "),
-        (&["shots", "--out-format", "gif"], "use png or jpg"),
+        (&["shots", "--out-format", "gif"], "use png, jpg, tif or webp"),
     ] {
         render(&home, &[arguments, &["--out", "out", "--quiet"]].concat()).refused(2, &[expected]);
         assert!(!home.path("out").exists(), "{arguments:?}");
