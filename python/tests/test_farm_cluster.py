@@ -123,14 +123,24 @@ def test_a_node_is_killed(cluster, sources, expected, tmp_path):
     cluster.add()
 
 
+def pause_child(out: Path) -> int | None:
+    """Stops a process that is writing a file for the folder `out`, so that it cannot end before it is killed."""
+    for child in children_at_work(out):
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGSTOP)
+            if child in children_at_work(out):
+                return child
+    return None
+
+
 def test_the_driver_is_killed_and_a_second_start_does_the_rest(cluster, sources, expected, tmp_path):
     out = tmp_path / "out"
     driver = start(out, sources, cluster)
     until(lambda: list(out.glob("*.y4m")), "the first result")
-    children = until(lambda: children_at_work(out), "another recording that is being made")
+    child = until(lambda: pause_child(out), "another recording that is being made")
     driver.kill()
     driver.communicate()
-    until(lambda: not any(map(is_alive, children)) and not children_at_work(out), "the death of what it had started")
+    until(lambda: not is_alive(child) and not children_at_work(out), "the death of what it had started")
     there = {path.name: path.stat() for path in out.glob("*.y4m")}
     assert 0 < len(there) < RECORDINGS
     assert any((out / ".bokehcam-farm").glob("*-*")), "nothing was left to sweep"
