@@ -57,7 +57,7 @@ impl PartialEq for Background {
 pub struct BackgroundVideo {
     /// The file.
     pub file: VideoFile,
-    /// Its first picture, at most [`MAX_FIRST_PX`] a side.
+    /// Its first picture, at most 4096 pixels a side.
     pub first: ColorImage,
 }
 
