@@ -118,6 +118,16 @@ impl Transform {
         self.transform(from.rgb.as_chunks::<3>().0, from.size(), area, into.rgb.as_chunks_mut::<3>().0);
     }
 
+    /// Returns the transformed picture. The area must be within it.
+    pub fn transform_color(&self, color: ColorImage) -> ColorImage {
+        if self.is_identity() {
+            return color;
+        }
+        let mut into = ColorImage::default();
+        self.apply_to_color(&color, &mut into);
+        into
+    }
+
     /// Returns the transformed pixels of a picture of `size`. The area must be within the picture.
     pub fn apply_to_pixels<T: Copy + Default>(&self, from: &[T], size: (u32, u32)) -> Vec<T> {
         let Some(area) = self.area_in(size) else { return Vec::new() };

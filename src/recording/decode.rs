@@ -10,7 +10,7 @@ use super::depth_covers;
 use super::fault::PictureFault;
 use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
 use super::samples::SampleFormat;
-use super::still;
+use super::upright::upright;
 use crate::color::{luminance, round_to_8bit};
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
@@ -69,8 +69,21 @@ pub(super) fn read_color(
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    expected.map_or(Ok(()), |expected| check_color_size(coded.size(), expected))?;
-    decode_color(coded, &mut scratch.pixels, into)
+    match expected {
+        Some(expected) => decode_color_of_size(coded, expected, &mut scratch.pixels, into),
+        None => decode_color(coded, &mut scratch.pixels, into),
+    }
+}
+
+/// Decodes as [`decode_color`] does, but rejects a picture whose size is not `expected` before.
+pub(super) fn decode_color_of_size(
+    coded: EncodedPicture,
+    expected: (u32, u32),
+    pixels: &mut Vec<u8>,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
+    check_color_size(coded.size(), expected)?;
+    decode_color(coded, pixels, into)
 }
 
 /// Rejects a picture of another size than `expected`.
@@ -90,15 +103,10 @@ pub(super) fn read_size(path: &Path) -> Result<(u32, u32), PictureFault> {
 
 /// Reads width and height of a picture as it is turned upright by its orientation tag, from its header only.
 pub(super) fn read_upright_size(path: &Path) -> Result<(u32, u32), PictureFault> {
-    let (width, height) = read_size(path)?;
+    let size = read_size(path)?;
     // Faults are reported by whatever decodes the picture.
-    let is_sideways = coded::read_orientation(path).is_ok_and(is_sideways);
-    Ok(if is_sideways { (height, width) } else { (width, height) })
-}
-
-fn is_sideways(orientation: Orientation) -> bool {
-    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
-    matches!(orientation, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
+    let orientation = coded::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    Ok(upright(orientation).rotated_size(size))
 }
 
 /// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag; its size is then `expected`.
@@ -117,7 +125,7 @@ pub(super) fn read_upright(
         return Err(PictureFault::Size { found, expected });
     }
     read_color(path, None, scratch, into)?;
-    *into = still::turned(std::mem::take(into), orientation);
+    *into = upright(orientation).transform_color(std::mem::take(into));
     Ok(())
 }
 

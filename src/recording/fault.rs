@@ -271,6 +271,6 @@ pub(super) fn decoder_fault(error: ImageError) -> PictureFault {
     }
 }
 
-fn damaged_fault(error: &dyn std::error::Error) -> PictureFault {
+pub(super) fn damaged_fault(error: &dyn std::error::Error) -> PictureFault {
     PictureFault::Damaged(error.to_string().replace('\n', " "))
 }

@@ -47,6 +47,7 @@ mod tiff_directory;
 mod tiff_file;
 mod timeline;
 mod unit;
+mod upright;
 mod writer;
 mod xmp;
 

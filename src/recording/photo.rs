@@ -2,15 +2,13 @@
 
 use std::path::Path;
 
-use image::metadata::Orientation;
-use image::{DynamicImage, ImageBuffer};
-
 use super::coded::EncodedPicture;
 use super::decode::{self, sample_u16};
 use super::encode::Raster;
 use super::fault::PictureFault;
 use super::photo_metadata::{SIXTEEN_BITS, TRANSPARENCY};
-use super::still::{PhotoFormat, photo_format, turned, write_raster};
+use super::still::{PhotoFormat, photo_format, write_raster};
+use super::upright::upright;
 use super::{PhotoMetadata, RecordingError, icc};
 use crate::color::{Picture16, ToneCurves};
 use crate::frame::ColorImage;
@@ -44,9 +42,7 @@ impl Photo {
         let mut photo = decoded.map_err(RecordingError::picture(path))?;
         drop(file);
         let orientation = photo.metadata.take_orientation();
-        if orientation != Orientation::NoTransforms {
-            photo.turn(orientation);
-        }
+        photo.transform(&upright(orientation));
         Ok(photo)
     }
 
@@ -93,30 +89,13 @@ impl Photo {
         Ok(photo)
     }
 
-    fn turn(&mut self, orientation: Orientation) {
-        let (width, height) = self.color.size();
-        let turn = |mut image: DynamicImage| {
-            image.apply_orientation(orientation);
-            image
-        };
-        self.color = turned(std::mem::take(&mut self.color), orientation);
-        if let Some(codes) = &mut self.codes {
-            let rgb = ImageBuffer::from_raw(width, height, std::mem::take(&mut codes.rgb)).unwrap_or_default();
-            codes.rgb = turn(DynamicImage::ImageRgb16(rgb)).into_rgb16().into_raw();
-            (codes.width, codes.height) = self.color.size();
-        }
-        if let Some(alpha) = &mut self.alpha {
-            let grey = ImageBuffer::from_raw(width, height, std::mem::take(alpha)).unwrap_or_default();
-            *alpha = turn(DynamicImage::ImageLuma16(grey)).into_luma16().into_raw();
-        }
-    }
-
     /// Turns, flips and cuts the photo. The area to keep must be within it.
     pub fn transform(&mut self, transform: &Transform) {
+        if transform.is_identity() {
+            return;
+        }
         let size = self.color.size();
-        let mut color = ColorImage::default();
-        transform.apply_to_color(&self.color, &mut color);
-        self.color = color;
+        self.color = transform.transform_color(std::mem::take(&mut self.color));
         if let Some(codes) = &mut self.codes {
             codes.rgb = transform.apply_to_pixels(codes.rgb.as_chunks::<3>().0, size).into_flattened();
             (codes.width, codes.height) = self.color.size();

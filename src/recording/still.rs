@@ -6,8 +6,8 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use image::ImageFormat;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageFormat, RgbImage};
 
 use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
@@ -17,6 +17,7 @@ use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
+use super::upright::upright;
 use super::{check_depth_scale, coded, depth_covers, encode, pfm, tiff_file};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
@@ -51,17 +52,7 @@ fn read_with_metadata(path: &Path) -> Result<(ColorImage, PhotoMetadata), Pictur
     drop(scratch);
 
     let orientation = metadata.take_orientation();
-    Ok((turned(image, orientation), metadata))
-}
-
-/// Returns a picture turned as an orientation tag says.
-pub(super) fn turned(image: ColorImage, orientation: Orientation) -> ColorImage {
-    let (width, height) = image.size();
-    let rgb = RgbImage::from_raw(width, height, image.rgb).unwrap_or_default();
-    let mut upright = DynamicImage::ImageRgb8(rgb);
-    upright.apply_orientation(orientation);
-    let (width, height) = (upright.width(), upright.height());
-    ColorImage { width, height, rgb: upright.into_bytes() }
+    Ok((upright(orientation).transform_color(image), metadata))
 }
 
 /// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.

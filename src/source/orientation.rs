@@ -9,8 +9,8 @@ use crate::capture::transformed::TransformedCamera;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::transformed::TransformedDepth;
+use crate::frame::DepthMap;
 use crate::frame::transform::Transform;
-use crate::frame::{ColorImage, DepthMap};
 use crate::recording::Photo;
 
 /// The transform of a source's pictures, and their size before it.
@@ -43,11 +43,8 @@ impl SourceTransform {
         });
         let first_depth = source.first_depth.map(|map| self.apply_to_map(map));
         let mut findings = source.findings;
-        findings.original = findings.original.map(|original| {
-            let mut into = ColorImage::default();
-            self.transform.apply_to_color(&original, &mut into);
-            Arc::new(into)
-        });
+        let transform = |original| Arc::new(self.transform.transform_color(Arc::unwrap_or_clone(original)));
+        findings.original = findings.original.map(transform);
         if let Some(FocusRule::Point { x, y }) = findings.focus {
             let point = self.transform.apply_to_point([x, y], self.own_px);
             findings.focus = point.map(|[x, y]| FocusRule::Point { x, y });

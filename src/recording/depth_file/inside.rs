@@ -10,6 +10,7 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::recording::coded::EncodedPicture;
 use crate::recording::embedded::{self, EmbeddedDepth, Focus};
 use crate::recording::fault::PictureFault;
+use crate::recording::upright::upright;
 use crate::recording::{PhotoMetadata, RecordingError, decode, still};
 
 /// A photo with its own depth.
@@ -85,21 +86,13 @@ fn decode_original(bytes: &[u8], orientation: Orientation) -> Result<ColorImage,
     let mut metadata: PhotoMetadata =
         decode::decode_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), &mut original)?;
     let own = metadata.take_orientation();
-    Ok(still::turned(original, if own == Orientation::NoTransforms { orientation } else { own }))
+    Ok(upright(if own == Orientation::NoTransforms { orientation } else { own }).transform_color(original))
 }
 
 /// Returns the point of the upright picture that (`x`, `y`) of the stored one becomes.
 fn turn_point(x: f32, y: f32, orientation: Orientation) -> Focus {
-    let (x, y) = match orientation {
-        Orientation::NoTransforms => (x, y),
-        Orientation::Rotate90 => (1.0 - y, x),
-        Orientation::Rotate180 => (1.0 - x, 1.0 - y),
-        Orientation::Rotate270 => (y, 1.0 - x),
-        Orientation::FlipHorizontal => (1.0 - x, y),
-        Orientation::FlipVertical => (x, 1.0 - y),
-        Orientation::Rotate90FlipH => (y, x),
-        Orientation::Rotate270FlipH => (1.0 - y, 1.0 - x),
-    };
+    // As fractions, whatever the size.
+    let [x, y] = upright(orientation).apply_to_point([x, y], (1, 1)).unwrap_or([x, y]);
     Focus::Point { x, y }
 }
 

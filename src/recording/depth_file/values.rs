@@ -5,7 +5,6 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use image::metadata::Orientation;
-use image::{ImageBuffer, Luma, imageops};
 
 use super::{FORMATS, exr, npy, tiff};
 use crate::files::input;
@@ -15,6 +14,7 @@ use crate::recording::fault::{PictureFault, open_fault};
 use crate::recording::pfm;
 use crate::recording::photo_metadata::PhotoMetadata;
 use crate::recording::unit::{self, MapUnit};
+use crate::recording::upright::upright;
 
 /// The numbers of a map, top row first.
 #[derive(Debug, Default)]
@@ -178,21 +178,11 @@ impl ColorCount {
 impl Values {
     /// Returns the map turned as an orientation tag says.
     pub fn turned(self, orientation: Orientation) -> Self {
-        if orientation == Orientation::NoTransforms {
+        let transform = upright(orientation);
+        if transform.is_identity() {
             return self;
         }
-        let Self { size: (width, height), numbers, .. } = self;
-        let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, numbers).unwrap_or_default();
-        let image = match orientation {
-            Orientation::NoTransforms => image,
-            Orientation::Rotate90 => imageops::rotate90(&image),
-            Orientation::Rotate180 => imageops::rotate180(&image),
-            Orientation::Rotate270 => imageops::rotate270(&image),
-            Orientation::FlipHorizontal => imageops::flip_horizontal(&image),
-            Orientation::FlipVertical => imageops::flip_vertical(&image),
-            Orientation::Rotate90FlipH => imageops::flip_horizontal(&imageops::rotate90(&image)),
-            Orientation::Rotate270FlipH => imageops::flip_horizontal(&imageops::rotate270(&image)),
-        };
-        Self { size: image.dimensions(), numbers: image.into_raw(), ..self }
+        let numbers = transform.apply_to_pixels(&self.numbers, self.size);
+        Self { size: transform.rotated_size(self.size), numbers, ..self }
     }
 }

@@ -92,8 +92,7 @@ impl Container for McapFile {
             }
             Picture::Compressed { data, .. } => {
                 let coded = EncodedPicture::open_bytes(data)?;
-                decode::check_color_size(coded.size(), expected)?;
-                decode::decode_color(coded, &mut scratch.pixels, into).map(drop)
+                decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
             }
         }
     }

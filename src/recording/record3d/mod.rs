@@ -17,7 +17,7 @@ use super::container::Container;
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::decode::{self, DepthUnits, Scratch};
 use super::error::RecordingError;
-use super::fault::PictureFault;
+use super::fault::{PictureFault, damaged_fault};
 use super::list::MAX_ENTRIES;
 use super::{MAX_SIDE_PX, Options, Unpaired};
 use crate::files::input;
@@ -45,7 +45,10 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let fault = |what: String| RecordingError::File { path: path.clone(), what };
     let file = input::open(path).map_err(RecordingError::io("open the recording", path))?;
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|error| {
-        fault(format!("not a whole recording of Record3D, which is a zip ({}); copy it again", one_line(&error)))
+        fault(format!(
+            "not a whole recording of Record3D, which is a zip ({}); copy it again",
+            error.to_string().replace('\n', " ")
+        ))
     })?;
     if archive.len() > 4 * MAX_ENTRIES {
         return Err(fault(format!("it has {} files, too many; split it", archive.len())));
@@ -115,12 +118,12 @@ impl Archive {
     fn read<'a>(&self, name: &str, bytes: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
         let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
         bytes.clear();
-        let entry = archive.by_name(name).map_err(|error| PictureFault::Damaged(one_line(&error)))?;
+        let entry = archive.by_name(name).map_err(|error| damaged_fault(&error))?;
         if entry.size() > MAX_PICTURE_BYTES {
             return Err(PictureFault::FileSize { bytes: entry.size(), max_bytes: MAX_PICTURE_BYTES });
         }
         let read = entry.take(MAX_PICTURE_BYTES).read_to_end(bytes);
-        read.map_err(|error| PictureFault::Damaged(one_line(&error)))?;
+        read.map_err(|error| damaged_fault(&error))?;
         Ok(bytes)
     }
 
@@ -146,8 +149,7 @@ impl Container for Archive {
         into: &mut ColorImage,
     ) -> Result<(), PictureFault> {
         let coded = EncodedPicture::open_bytes(self.read(&self.frames[frame].0, &mut scratch.file)?)?;
-        decode::check_color_size(coded.size(), expected)?;
-        decode::decode_color(coded, &mut scratch.pixels, into).map(drop)
+        decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
     }
 
     fn read_depth(
@@ -162,7 +164,7 @@ impl Container for Archive {
         scratch.pixels.clear();
         let mut decoder = LzfseRingDecoder::default();
         let decoded = decoder.reader_bytes(coded).take(MAX_DEPTH_BYTES).read_to_end(&mut scratch.pixels);
-        decoded.map_err(|error| PictureFault::Damaged(one_line(&error)))?;
+        decoded.map_err(|error| damaged_fault(&error))?;
         let values = scratch.pixels.as_chunks::<4>().0;
         let (width, height) = self
             .find_depth_size(values.len(), color)
@@ -175,8 +177,4 @@ impl Container for Archive {
         }
         Ok(())
     }
-}
-
-fn one_line(error: &dyn std::error::Error) -> String {
-    error.to_string().replace('\n', " ")
 }
