@@ -14,6 +14,20 @@ const MAX_ANGLE_DEG: f64 = 80.0;
 const STEP_DEG: f64 = 0.1;
 
 impl Distortion {
+    /// Returns the coefficients of the model.
+    pub fn coefficients(&self) -> &[f64] {
+        match self {
+            Self::RadialTangential(coefficients) => coefficients,
+            Self::PrismTilted(coefficients) => coefficients,
+            Self::Equidistant(coefficients) => coefficients,
+        }
+    }
+
+    /// Returns whether it distorts nothing.
+    pub fn is_none(&self) -> bool {
+        !matches!(self, Self::Equidistant(_)) && self.coefficients().iter().all(|&coefficient| coefficient == 0.0)
+    }
+
     /// Returns the distorted distance from the axis for the undistorted distance `radius`, both on the plane at
     /// distance 1, without the tangential part.
     fn distort_radius(&self, radius: f64) -> f64 {
@@ -81,10 +95,14 @@ impl Distortion {
             let slopes = DMat2::from_cols(slope(DVec2::X * DELTA), slope(DVec2::Y * DELTA));
             let next = guess + slopes.inverse() * (point - self.distort(guess));
             // A longer step leaves the neighbourhood in which the method converges.
-            if !next.is_finite() || (next - guess).length() > 0.1 {
+            let step = next.distance(guess);
+            if !next.is_finite() || step > 0.1 {
                 break;
             }
             guess = next;
+            if step < 1e-15 {
+                break;
+            }
         }
         guess
     }

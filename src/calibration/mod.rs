@@ -2,7 +2,7 @@
 //! pictures.
 //!
 //! [`load_calibration`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] turns its pictures into a rectified
-//! pair.
+//! pair. [`registration::Registration`] reprojects depth into the view of a colour camera.
 
 #[cfg(feature = "files")]
 mod entries;
@@ -25,6 +25,7 @@ mod opencv;
 mod orbslam;
 pub mod rectification;
 pub mod rectifier;
+pub mod registration;
 #[cfg(feature = "files")]
 mod ros;
 #[cfg(feature = "files")]
@@ -302,18 +303,22 @@ fn scale_point_px(point_px: DVec2, scale: DVec2) -> DVec2 {
     (point_px + 0.5) * scale - 0.5
 }
 
+/// Returns columns and rows as a vector.
+fn sides_px((width, height): (u32, u32)) -> DVec2 {
+    DVec2::new(f64::from(width), f64::from(height))
+}
+
 impl CameraIntrinsics {
     /// Returns the scale along columns and rows from the calibration pictures to those of `size`; 1 if their size is
     /// unknown and may be `size`.
     fn scale_factor(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {
-        let sides = |(width, height): (u32, u32)| DVec2::new(f64::from(width), f64::from(height));
         let Some(calibrated) = self.size else {
-            let fraction = self.center_px / sides(size);
+            let fraction = self.center_px / sides_px(size);
             let is_plausible = fraction.min_element() >= 0.25 && fraction.max_element() <= 0.75;
             let refusal = CalibrationError::NoSize { center_px: self.center_px.into(), found: size };
             return if is_plausible { Ok(DVec2::ONE) } else { Err(refusal) };
         };
-        let scale = sides(size) / sides(calibrated);
+        let scale = sides_px(size) / sides_px(calibrated);
         let is_same = (scale.x / scale.y - 1.0).abs() <= ASPECT_TOLERANCE;
         if is_same { Ok(scale) } else { Err(CalibrationError::AspectRatio { calibrated, found: size }) }
     }

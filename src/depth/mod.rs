@@ -28,7 +28,6 @@ pub mod plate;
 pub mod recorded;
 mod reduced;
 pub mod refine;
-pub mod registration;
 #[cfg(feature = "networks")]
 pub mod single_camera;
 pub mod stereo;

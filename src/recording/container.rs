@@ -24,11 +24,12 @@ pub(super) trait Container: Debug + Send + Sync {
         into: &mut ColorImage,
     ) -> Result<(), PictureFault>;
 
-    /// Reads depth in metres, 0 = unknown. Rejects a map that does not cover a picture of `color` pixels.
+    /// Reads depth in metres, 0 = unknown. Rejects a map that does not cover the view of a picture of `size`: that of the
+    /// colour camera, or of the depth camera if there is a calibration.
     fn read_depth(
         &self,
         frame: usize,
-        color: (u32, u32),
+        size: (u32, u32),
         scratch: &mut Scratch,
         into: &mut DepthMap,
     ) -> Result<(), PictureFault>;

@@ -10,6 +10,7 @@ use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
+use crate::calibration::registration::RgbdCalibration;
 use crate::optics::StereoRig;
 
 /// A recording layout: its detection and its reader.
@@ -36,6 +37,8 @@ impl Layout {
 pub(super) struct Contents {
     pub(super) frames: Vec<ListedFrame>,
     pub(super) depth: Option<DepthFormat>,
+    /// For depth of another camera's view.
+    pub(super) depth_calibration: Option<RgbdCalibration>,
     pub(super) stereo_geometry: Option<StereoGeometry>,
     /// Number of disparities to search, from 0, if stated: a multiple of 16.
     pub(super) disparity_count: Option<u32>,

@@ -23,6 +23,9 @@ pub struct Scratch {
     pub(super) pixels: Vec<u8>,
     /// A right picture before its conversion to luma.
     right: ColorImage,
+    /// Depth in the view of the depth camera, and in that of a colour camera without distortion.
+    pub(super) measured: DepthMap,
+    pub(super) drawn: DepthMap,
 }
 
 impl Scratch {

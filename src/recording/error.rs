@@ -149,6 +149,13 @@ pub enum RecordingError {
     /// The calibration of a raw pair is invalid.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// The calibration of the depth camera does not belong to the recording.
+    #[error("{}: the depth calibration: {what}", dir.display())]
+    DepthCalibration {
+        dir: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
     /// A line of a list is invalid.
     #[error("{}:{line}: {fault}", list.display())]
     Line {

@@ -174,6 +174,17 @@ pub enum PictureFault {
         /// Width and height of the colour pictures.
         color: (u32, u32),
     },
+    /// A depth map has another size than its calibration.
+    #[error(
+        "the depth map is {}x{}, and the depth camera is calibrated for {}x{}; correct the calibration",
+        found.0, found.1, calibrated.0, calibrated.1
+    )]
+    CalibratedSize {
+        /// Width and height of the depth map.
+        found: (u32, u32),
+        /// Width and height for which the depth camera is calibrated.
+        calibrated: (u32, u32),
+    },
     /// A mask does not cover its picture.
     #[error(
         "the mask is {}x{}, which does not cover a picture of {}x{}; export it at that size, or smaller with the same aspect",

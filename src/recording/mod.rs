@@ -18,6 +18,7 @@ mod coded;
 mod container;
 mod contents;
 mod decode;
+mod depth;
 mod encode;
 mod error;
 mod euroc;
@@ -65,7 +66,8 @@ pub use photo_metadata::PhotoMetadata;
 pub use writer::RecordingWriter;
 
 use crate::calibration::StereoCalibration;
-use crate::frame::{ColorImage, DepthMap, GrayImage};
+use crate::calibration::registration::Registration;
+use crate::frame::{ColorImage, GrayImage};
 use crate::optics::StereoRig;
 use container::Container;
 use contents::{DepthFormat, Layout, PictureSource, RecordingFolder};
@@ -125,6 +127,8 @@ pub struct Recording {
     size: (u32, u32),
     period_ns: u64,
     depth: Option<DepthFormat>,
+    /// For depth of another camera's view.
+    depth_registration: Option<Registration>,
     stereo_geometry: Option<StereoGeometry>,
     disparity_count: Option<u32>,
     unpaired: Unpaired,
@@ -181,7 +185,7 @@ impl Recording {
         let frames: Vec<_> = listed
             .map(|(frame, time_ns)| Frame { time_ns, color: frame.color, right: frame.right, depth: frame.depth })
             .collect();
-        Ok(Self {
+        let mut recording = Self {
             layout: layout.name,
             folder,
             container: contents.container,
@@ -189,13 +193,18 @@ impl Recording {
             period_ns: timeline::median_period_ns(frames.iter().map(|frame| frame.time_ns)),
             frames,
             depth: contents.depth,
+            depth_registration: None,
             stereo_geometry: contents.stereo_geometry,
             disparity_count: contents.disparity_count,
             unpaired: contents.unpaired,
             has_times: contents.has_times,
             are_photos: contents.are_photos,
             is_chosen_by_size: contents.is_chosen_by_size,
-        })
+        };
+        if let Some(calibration) = contents.depth_calibration {
+            recording.set_depth_calibration(calibration)?;
+        }
+        Ok(recording)
     }
 
     /// Returns the name of the layout, such as `TUM RGB-D`.
@@ -232,11 +241,6 @@ impl Recording {
         self.period_ns
     }
 
-    /// Returns whether its depth is only relative.
-    pub fn has_relative_depth(&self) -> bool {
-        matches!(self.depth, Some(DepthFormat::Inverse { .. }))
-    }
-
     /// Returns whether its times are recorded, so that [`Options::period_ns`] does not count.
     pub fn has_times(&self) -> bool {
         self.has_times
@@ -250,16 +254,6 @@ impl Recording {
     /// Returns whether [`Options::topics`] can choose its pictures.
     pub fn has_topics(&self) -> bool {
         self.layout == mcap::LAYOUT.name
-    }
-
-    /// Returns whether its depth is in the units of [`Options::depth_scale`], and not in units that it states itself.
-    pub fn has_depth_in_units(&self) -> bool {
-        matches!(self.depth, Some(DepthFormat::Units(_)))
-    }
-
-    /// Returns whether the frames have depth.
-    pub fn has_depth(&self) -> bool {
-        self.depth.is_some()
     }
 
     /// Returns the file names of the colour pictures, without extension; empty for lines that name none.
@@ -298,34 +292,6 @@ impl Recording {
         let read = match self.are_photos {
             true => decode::read_upright(&path, self.size, scratch, into),
             false => decode::read_color(&path, Some(self.size), scratch, into).map(drop),
-        };
-        read.map_err(|fault| source.error(&self.folder.dir, fault))
-    }
-
-    /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
-    /// with at most as many pixels.
-    ///
-    /// # Errors
-    /// Same as for [`Recording::read_color`]; or the recording has no depth.
-    pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
-        let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
-        let form = self.depth.as_ref().ok_or_else(no_depth)?;
-        let frame = self.frame(index)?;
-        // Without a depth map, the line of the colour picture is at fault.
-        let source = frame.depth.as_ref().unwrap_or(&frame.color);
-        if let Some(container) = &self.container {
-            let read = container.read_depth(index, self.size, scratch, into);
-            return read.map_err(|fault| source.error(&self.folder.dir, fault));
-        }
-        let path = self.folder.locate(source)?;
-        let read = match form {
-            DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
-                decode::read_depth(&path, *units, Some(self.size), scratch, into)
-            }
-            DepthFormat::Inverse { white_is_far } => {
-                decode::read_inverse_depth(&path, *white_is_far, self.size, scratch, into)
-            }
-            DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
         };
         read.map_err(|fault| source.error(&self.folder.dir, fault))
     }

@@ -5,14 +5,14 @@ use std::path::Path;
 use super::opened::recorded_depth_origin;
 use super::orientation::SourceTransform;
 use super::{
-    DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, single_camera, video,
+    DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, registration,
+    single_camera, video,
 };
 use crate::capture::{CaptureError, FrameData};
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::looped_recording::LoopedRecording;
 use crate::depth::map_sequence::SequenceDepth;
-use crate::recording::Recording;
 use crate::recording::map_sequence::{MapSequence, Pictured};
 use crate::video::VideoFile;
 
@@ -28,9 +28,16 @@ pub(super) fn add_external_depth(
     clock: &Clock,
 ) -> Result<Source, SourceError> {
     let Options { depth, depth_choice: choice, .. } = request.options;
-    if depth.depth_calibration.is_some() && !matches!(choice, DepthChoice::Device(_)) {
+    let is_of_camera = match choice {
+        DepthChoice::Device(_) => true,
+        DepthChoice::Folder(_) => choice.map_folder().is_none(),
+        DepthChoice::Auto | DepthChoice::Recorded => matches!(name, SourceName::Folder(_)),
+        _ => false,
+    };
+    if depth.depth_calibration.is_some() && !is_of_camera {
         return SourceError::usage_error(
-            "--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2",
+            "--depth-calibration is for a depth camera, or its recording: name it with --depth, such as --depth \
+             /dev/video2",
         );
     }
     if !choice.is_external() {
@@ -49,7 +56,7 @@ pub(super) fn add_external_depth(
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
-            let recording = Recording::open(folder, &request.options.recording_options())?;
+            let recording = registration::open_recording(folder, true, request.options)?;
             let depth_from = recorded_depth_origin(&recording);
             request.check_relative_depth(depth_from)?;
             first_depth = request.read_first_depth(&recording);
@@ -106,12 +113,11 @@ fn add_map_sequence(
 /// Opens the depth camera `name` with scale and registration from the options.
 #[cfg(feature = "camera")]
 fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
-    use super::registration;
     use crate::depth::live::{LiveDepth, Units};
     use crate::v4l2::live::OpenError;
-    let registration = options.depth_calibration.as_deref().map(registration::load_registration).transpose()?;
+    let calibration = options.depth_calibration.as_deref().map(registration::load_calibration).transpose()?;
     let units = Units { per_m: options.live_scale(), invalid: options.depth_invalid };
-    match LiveDepth::open(name, units, registration, clock.clone()) {
+    match LiveDepth::open(name, units, calibration, clock.clone()) {
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(

@@ -25,7 +25,6 @@ mod opened;
 pub mod options;
 pub mod orientation;
 pub mod photo;
-#[cfg(feature = "camera")]
 pub mod registration;
 pub mod single_camera;
 mod stereo;

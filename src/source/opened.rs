@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 #[cfg(feature = "camera")]
 use super::name;
-use super::{DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo, video};
+use super::{
+    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo,
+    registration, video,
+};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
@@ -73,7 +76,8 @@ impl Opened {
             }
             SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &request.options.recording_options())?);
+                let is_depth_used = matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
+                let recording = Arc::new(registration::open_recording(folder, is_depth_used, request.options)?);
                 let name = folder.display().to_string();
                 warn_of_own_properties(&recording, frames);
                 let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;

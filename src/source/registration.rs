@@ -1,14 +1,16 @@
-//! The calibration file of a depth camera relative to the colour camera.
+//! The calibration file of a depth camera relative to the colour camera, and recordings that are opened with it.
 
 use std::path::Path;
 
-use glam::{Mat3, Vec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::SourceError;
-use crate::depth::registration::{Calibration, CalibrationError, Pinhole, Registration};
+use super::{Options, SourceError};
+use crate::calibration::registration::{RgbdCalibration, RgbdCalibrationError};
+use crate::calibration::{CameraIntrinsics, Distortion};
 use crate::files::input;
+use crate::recording::Recording;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -24,32 +26,62 @@ struct File {
 struct Camera {
     width: u32,
     height: u32,
-    fx: f32,
-    fy: f32,
-    cx: f32,
-    cy: f32,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    distortion: Vec<f64>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Pose {
-    rotation: [f32; 9],
-    translation_m: [f32; 3],
+    rotation: [f64; 9],
+    translation_m: [f64; 3],
 }
 
 impl Camera {
-    fn to_pinhole(&self) -> Pinhole {
-        let &Self { width, height, fx, fy, cx, cy } = self;
-        Pinhole { width, height, fx, fy, cx, cy }
+    /// Returns the camera, or the reason why it is none.
+    fn to_intrinsics(&self) -> Result<CameraIntrinsics, String> {
+        let &Self { width, height, fx, fy, cx, cy, ref distortion } = self;
+        if ![0, 4, 5, 8].contains(&distortion.len()) {
+            return Err(format!(
+                "distortion has {} numbers, and not 4, 5 or 8: k1 k2 p1 p2 k3 k4 k5 k6",
+                distortion.len()
+            ));
+        }
+        let mut coefficients = [0.0; 8];
+        coefficients[..distortion.len()].copy_from_slice(distortion);
+        Ok(CameraIntrinsics {
+            size: Some((width, height)),
+            focal_px: DVec2::new(fx, fy),
+            center_px: DVec2::new(cx, cy),
+            distortion: Distortion::RadialTangential(coefficients),
+        })
     }
+}
+
+/// Opens a recording. If its depth `is_used`, it is registered by the calibration that the options name.
+///
+/// # Errors
+/// The recording cannot be opened, or the calibration does not belong to it.
+pub(super) fn open_recording(folder: &Path, is_used: bool, options: &Options) -> Result<Recording, SourceError> {
+    let file = options.depth.depth_calibration.as_deref().filter(|_| is_used);
+    let calibration = file.map(load_calibration).transpose()?;
+    let mut recording = Recording::open(folder, &options.recording_options())?;
+    if let Some(calibration) = calibration {
+        recording.set_depth_calibration(calibration)?;
+    }
+    Ok(recording)
 }
 
 /// Reads the calibration file `path`.
 ///
 /// # Errors
 /// The file is unreadable, has a wrong or missing key, or invalid numbers.
-pub fn load_registration(path: &Path) -> Result<Registration, SourceError> {
-    parse_registration(
+pub fn load_calibration(path: &Path) -> Result<RgbdCalibration, SourceError> {
+    parse_calibration(
         path,
         &input::read_text(path, input::MAX_CALIBRATION_BYTES)
             .map_err(|source| SourceError::Io { path: path.to_owned(), source })?,
@@ -60,7 +92,7 @@ pub fn load_registration(path: &Path) -> Result<Registration, SourceError> {
 ///
 /// # Errors
 /// The text is not a depth calibration.
-pub fn parse_registration(path: &Path, text: &str) -> Result<Registration, SourceError> {
+pub fn parse_calibration(path: &Path, text: &str) -> Result<RgbdCalibration, SourceError> {
     let refuse = |at: usize, what: String| SourceError::Registration {
         path: path.to_owned(),
         line: text[..at.min(text.len())].matches('\n').count() + 1,
@@ -70,17 +102,19 @@ pub fn parse_registration(path: &Path, text: &str) -> Result<Registration, Sourc
         refuse(error.span().map_or(0, |span| span.start), error.message().trim().replace('\n', ", "))
     })?;
     let pose = file.pose.get_ref();
-    let calibration = Calibration {
-        depth: file.depth.get_ref().to_pinhole(),
-        color: file.color.get_ref().to_pinhole(),
-        rotation: Mat3::from_cols_array(&pose.rotation).transpose(),
-        translation_m: Vec3::from_array(pose.translation_m),
+    let camera =
+        |table: &Spanned<Camera>| table.get_ref().to_intrinsics().map_err(|what| refuse(table.span().start, what));
+    let calibration = RgbdCalibration {
+        depth: camera(&file.depth)?,
+        color: camera(&file.color)?,
+        rotation: DMat3::from_cols_array(&pose.rotation).transpose(),
+        translation_m: DVec3::from_array(pose.translation_m),
     };
-    Registration::new(calibration).map_err(|error| {
+    calibration.validate().map(|()| calibration).map_err(|error| {
         let table = match error {
-            CalibrationError::Depth(_) => file.depth.span(),
-            CalibrationError::Color(_) => file.color.span(),
-            CalibrationError::Pose(_) => file.pose.span(),
+            RgbdCalibrationError::Depth(_) => file.depth.span(),
+            RgbdCalibrationError::Color(_) => file.color.span(),
+            RgbdCalibrationError::Pose(_) => file.pose.span(),
         };
         refuse(table.start, error.to_string())
     })
@@ -89,6 +123,7 @@ pub fn parse_registration(path: &Path, text: &str) -> Result<Registration, Sourc
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::registration::Registration;
     use crate::frame::DepthMap;
 
     const GOOD: &str = "\
@@ -112,15 +147,19 @@ rotation = [1, 0, 0, 0, 1, 0, 0, 0, 1]
 translation_m = [0.5, 0, 0]
 ";
 
+    fn registration(text: &str) -> Registration {
+        Registration::new(parse_calibration(Path::new("c.toml"), text).unwrap(), (4, 2)).unwrap()
+    }
+
     fn refusal(text: &str) -> String {
-        parse_registration(Path::new("c.toml"), text).unwrap_err().to_string()
+        parse_calibration(Path::new("c.toml"), text).unwrap_err().to_string()
     }
 
     #[test]
     fn a_calibration_is_read() {
         let from = DepthMap { width: 4, height: 2, metres: vec![1.0; 8], ..DepthMap::default() };
-        let mut into = DepthMap::default();
-        parse_registration(Path::new("c.toml"), GOOD).unwrap().register(&from, &mut into);
+        let (mut scratch, mut into) = (DepthMap::default(), DepthMap::default());
+        registration(GOOD).register(&from, &mut scratch, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0], "half a metre to the right is two pixels");
         // Row by row: a quarter turn about the optical axis maps x to y.
         let turned = GOOD.replace("1, 0, 0, 0, 1, 0, 0, 0, 1", "0, -1, 0, 1, 0, 0, 0, 0, 1").replace("[0.5", "[0");
@@ -130,7 +169,7 @@ translation_m = [0.5, 0, 0]
             metres: vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
             ..DepthMap::default()
         };
-        parse_registration(Path::new("c.toml"), &turned).unwrap().register(&from, &mut into);
+        registration(&turned).register(&from, &mut scratch, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
     }
 

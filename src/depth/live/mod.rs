@@ -12,8 +12,8 @@ use std::time::Duration;
 
 pub use units::Units;
 
-use super::registration::Registration;
 use super::{DepthError, DepthSource, FrameInput};
+use crate::calibration::registration::{Registration, RgbdCalibration};
 use crate::clock::Clock;
 use crate::frame::DepthMap;
 use crate::layout::Content;
@@ -33,7 +33,11 @@ const MAX_POLLS: usize = 8;
 pub struct LiveDepth {
     live: LiveDevice,
     units: Units,
+    calibration: Option<RgbdCalibration>,
+    /// For maps of the size of the last one.
     registration: Option<Registration>,
+    /// Depth before the colour camera's lens distorts it.
+    scratch: DepthMap,
     pairing: Pairing,
     clock: Clock,
     /// Whether the loss of depth was logged, but not its return.
@@ -41,19 +45,25 @@ pub struct LiveDepth {
 }
 
 impl LiveDepth {
-    /// Opens the depth camera `name`. Without a registration its view is assumed to be that of the colour camera.
+    /// Opens the depth camera `name`. Without a calibration its view is assumed to be that of the colour camera.
     ///
     /// # Errors
     /// Fails if the camera does not exist, is busy, or does not deliver depth.
-    pub fn open(name: &str, units: Units, registration: Option<Registration>, clock: Clock) -> Result<Self, OpenError> {
+    pub fn open(
+        name: &str,
+        units: Units,
+        calibration: Option<RgbdCalibration>,
+        clock: Clock,
+    ) -> Result<Self, OpenError> {
         let live = LiveDevice::open(name, ModeRequest::for_content(Content::Depth), Vec::new(), clock.clone())?;
-        if registration.is_none() {
+        if calibration.is_none() {
             tracing::info!(
                 "{}: assumed to see the same as the colour camera; if it does not, give --depth-calibration",
                 live.name()
             );
         }
-        Ok(Self { live, units, registration, pairing: Pairing::default(), clock, is_stale: false })
+        let (registration, scratch, pairing) = Default::default();
+        Ok(Self { live, units, calibration, registration, scratch, pairing, clock, is_stale: false })
     }
 
     /// Decodes the maps that the camera has ready into `pairing`; waits up to `timeout` for the first of them.
@@ -107,8 +117,14 @@ impl DepthSource for LiveDepth {
         let Some(nearest) = self.pairing.nearest(captured_ns) else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
-        match &mut self.registration {
-            Some(registration) => registration.register(nearest, map),
+        let size = nearest.size();
+        if let Some(calibration) = self.calibration
+            && self.registration.as_ref().is_none_or(|registration| registration.size() != size)
+        {
+            self.registration = Registration::new(calibration, size).ok();
+        }
+        match &self.registration {
+            Some(registration) => registration.register(nearest, &mut self.scratch, map),
             None => {
                 map.resize(nearest.width, nearest.height);
                 map.metres.copy_from_slice(&nearest.metres);

@@ -155,7 +155,7 @@ impl Container for Archive {
     fn read_depth(
         &self,
         frame: usize,
-        color: (u32, u32),
+        size: (u32, u32),
         scratch: &mut Scratch,
         into: &mut DepthMap,
     ) -> Result<(), PictureFault> {
@@ -167,9 +167,9 @@ impl Container for Archive {
         decoded.map_err(|error| damaged_fault(&error))?;
         let values = scratch.pixels.as_chunks::<4>().0;
         let (width, height) = self
-            .find_depth_size(values.len(), color)
+            .find_depth_size(values.len(), size)
             .ok_or_else(|| PictureFault::Damaged(format!("{} depths, which is no size of a map", values.len())))?;
-        decode::check_depth_size((width, height), color)?;
+        decode::check_depth_size((width, height), size)?;
         into.resize(width, height);
         for (metres, &value) in into.metres.iter_mut().zip(values) {
             let value = f32::from_le_bytes(value);

@@ -1,0 +1,108 @@
+//! The depth of a recording, in the view of its colour camera.
+
+use std::mem;
+
+use super::contents::DepthFormat;
+use super::decode::{self, Scratch};
+use super::error::RecordingError;
+use super::fault::PictureFault;
+use super::{Recording, depth_covers, pfm};
+use crate::calibration::registration::{Registration, RgbdCalibration};
+use crate::frame::DepthMap;
+
+impl Recording {
+    /// Returns whether the frames have depth.
+    pub fn has_depth(&self) -> bool {
+        self.depth.is_some()
+    }
+
+    /// Returns whether its depth is only relative.
+    pub fn has_relative_depth(&self) -> bool {
+        matches!(self.depth, Some(DepthFormat::Inverse { .. }))
+    }
+
+    /// Returns whether its depth is in the units of [`Options::depth_scale`](super::Options::depth_scale), and not in
+    /// units that it states itself.
+    pub fn has_depth_in_units(&self) -> bool {
+        matches!(self.depth, Some(DepthFormat::Units(_)))
+    }
+
+    /// Sets the calibration of a depth camera that looks from another place than the colour camera:
+    /// [`Recording::read_depth`] then registers its maps. It replaces the recording's own.
+    ///
+    /// # Errors
+    /// The calibration is invalid or for pictures of another aspect, or depth is relative.
+    pub fn set_depth_calibration(&mut self, calibration: RgbdCalibration) -> Result<(), RecordingError> {
+        let refuse = |what: String| RecordingError::DepthCalibration { dir: self.folder.dir.clone(), what };
+        if !self.has_depth() {
+            return Err(RecordingError::NoDepth { dir: self.folder.dir.clone() });
+        }
+        if self.has_relative_depth() {
+            return Err(refuse("registration needs distances, and this depth is relative".to_owned()));
+        }
+        let size = calibration.depth.size.unwrap_or_default();
+        let registration = Registration::new(calibration, size).map_err(|error| refuse(error.to_string()))?;
+        let ((width, height), (found_width, found_height)) = (calibration.color.size.unwrap_or_default(), self.size);
+        if !depth_covers(registration.picture_size(), self.size) {
+            return Err(refuse(format!(
+                "the colour camera is calibrated for {width}x{height}, and the pictures are {found_width}x{found_height}"
+            )));
+        }
+        self.depth_registration = Some(registration);
+        Ok(())
+    }
+
+    /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
+    /// with at most as many pixels.
+    ///
+    /// # Errors
+    /// Same as for [`Recording::read_color`]; or the recording has no depth.
+    pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
+        let Some(registration) = &self.depth_registration else {
+            return self.decode_depth(index, self.size, scratch, into);
+        };
+        let mut measured = mem::take(&mut scratch.measured);
+        let read = self.decode_depth(index, registration.size(), scratch, &mut measured);
+        if read.is_ok() {
+            registration.register(&measured, &mut scratch.drawn, into);
+        }
+        scratch.measured = measured;
+        read
+    }
+
+    /// Reads the depth of frame `index` as it was recorded, of the view of pictures of `size`; of exactly this size if it
+    /// is to be registered.
+    fn decode_depth(
+        &self,
+        index: usize,
+        size: (u32, u32),
+        scratch: &mut Scratch,
+        into: &mut DepthMap,
+    ) -> Result<(), RecordingError> {
+        let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
+        let form = self.depth.as_ref().ok_or_else(no_depth)?;
+        let frame = self.frame(index)?;
+        // Without a depth map, the line of the colour picture is at fault.
+        let source = frame.depth.as_ref().unwrap_or(&frame.color);
+        let read = match &self.container {
+            Some(container) => container.read_depth(index, size, scratch, into),
+            None => {
+                let path = self.folder.locate(source)?;
+                match form {
+                    DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
+                        decode::read_depth(&path, *units, Some(size), scratch, into)
+                    }
+                    DepthFormat::Inverse { white_is_far } => {
+                        decode::read_inverse_depth(&path, *white_is_far, size, scratch, into)
+                    }
+                    DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, size, scratch, into),
+                }
+            }
+        };
+        let read = read.and_then(|()| match self.depth_registration.is_some() && into.size() != size {
+            true => Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size }),
+            false => Ok(()),
+        });
+        read.map_err(|fault| source.error(&self.folder.dir, fault))
+    }
+}
