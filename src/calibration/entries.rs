@@ -4,12 +4,11 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::Distortion;
 use super::error::{CalibrationError, Fault};
+use super::lens::LensFault;
 use super::tree::Value;
 
 /// Largest deviation of a matrix from a rotation: calibrations are written with few digits.
 const ROTATION_TOLERANCE: f64 = 1e-3;
-/// Maximum tilt of a sensor.
-const MAX_TILT_RAD: f64 = 0.5;
 /// Upper limit of a baseline, in any unit.
 const MAX_BASELINE: f64 = 1e5;
 /// Plausible focal lengths in pixels.
@@ -43,36 +42,17 @@ pub(super) fn parse_camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), Ca
 pub(super) fn parse_distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
     let name = model.map(|model| model.text()).transpose()?.unwrap_or("radial-tangential");
     let matrix = value.parse_matrix()?;
+    let is_vector = matrix.rows == 1 || matrix.cols == 1 || matrix.data.is_empty();
     let wrong_size = |expected| {
         let found = (matrix.rows, matrix.cols);
         value.to_error(Fault::Dimensions { key: value.key(), found, expected })
     };
-    let is_vector = matrix.rows == 1 || matrix.cols == 1;
-    match name.to_ascii_lowercase().replace('_', "-").as_str() {
-        // ROS writes no coefficients, and at times no model, for pictures without distortion.
-        "none" | "" | "plumb-bob" if matrix.data.is_empty() => Ok(Distortion::RadialTangential([0.0; 8])),
-        "radial-tangential" | "radtan" | "plumb-bob" | "rational-polynomial" | "opencv" | "pinhole" => {
-            if !is_vector || ![4, 5, 8, 12, 14].contains(&matrix.data.len()) {
-                return Err(wrong_size("a vector of 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)"));
-            }
-            let mut all = [0.0; 14];
-            all[..matrix.data.len()].copy_from_slice(&matrix.data);
-            if all[12..].iter().any(|tilt_rad| tilt_rad.abs() > MAX_TILT_RAD) {
-                return Err(impossible_value(value, "has a sensor that is tilted by more than 0.5 radians"));
-            }
-            // The first 8 are k1 to k6, p1 and p2; the others belong to a thin prism and a tilted sensor.
-            let [k1, k2, p1, p2, k3, k4, k5, k6, rest @ ..] = all;
-            Ok(match rest == [0.0; 6] {
-                true => Distortion::RadialTangential([k1, k2, p1, p2, k3, k4, k5, k6]),
-                false => Distortion::PrismTilted(all),
-            })
-        }
-        "equidistant" | "fisheye" | "kannala-brandt" | "opencv-fisheye" => {
-            let all = matrix.data.as_slice().try_into().ok().filter(|_| is_vector);
-            all.map(Distortion::Equidistant).ok_or_else(|| wrong_size("a vector of 4 (k1 k2 k3 k4)"))
-        }
-        "none" => Ok(Distortion::RadialTangential([0.0; 8])),
-        _ => {
+    match Distortion::from_model(name, &matrix.data) {
+        Ok(_) if !is_vector => Err(wrong_size("a vector")),
+        Ok(distortion) => Ok(distortion),
+        Err(LensFault::Count(expected)) => Err(wrong_size(expected)),
+        Err(LensFault::Tilt) => Err(impossible_value(value, "has a sensor that is tilted by more than 0.5 radians")),
+        Err(LensFault::Model) => {
             let model = model.unwrap_or(value);
             let known = "radial-tangential, equidistant or none";
             Err(model.to_error(Fault::Model { key: model.key(), found: name.into(), known }))

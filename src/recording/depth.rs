@@ -27,12 +27,11 @@ impl Recording {
         matches!(self.depth, Some(DepthFormat::Units(_)))
     }
 
-    /// Sets the calibration of a depth camera that looks from another place than the colour camera:
-    /// [`Recording::read_depth`] then registers its maps. It replaces the recording's own.
+    /// Returns the recording with its depth registered: the depth camera looks from another place than the colour camera.
     ///
     /// # Errors
-    /// The calibration is invalid or for pictures of another aspect, or depth is relative.
-    pub fn set_depth_calibration(&mut self, calibration: RgbdCalibration) -> Result<(), RecordingError> {
+    /// The calibration is invalid or for pictures of another aspect; or there is no depth, or only relative depth.
+    pub(super) fn with_registered_depth(mut self, calibration: RgbdCalibration) -> Result<Self, RecordingError> {
         let refuse = |what: String| RecordingError::DepthCalibration { dir: self.folder.dir.clone(), what };
         if !self.has_depth() {
             return Err(RecordingError::NoDepth { dir: self.folder.dir.clone() });
@@ -49,7 +48,7 @@ impl Recording {
             )));
         }
         self.depth_registration = Some(registration);
-        Ok(())
+        Ok(self)
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture

@@ -152,7 +152,7 @@ impl Recording {
     ///
     /// # Errors
     /// The folder is not a recording, or a list is missing or empty; no depth map or right picture pairs with a colour
-    /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture is readable (reports
+    /// picture; a calibration is faulty; the depth scale is not a number > 0; no colour picture is readable (reports
     /// the first). Without `keep_going` also any faulty line of a list, and a missing right picture.
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
         options.depth_scale.map_or(Ok(()), check_depth_scale)?;
@@ -185,7 +185,7 @@ impl Recording {
         let frames: Vec<_> = listed
             .map(|(frame, time_ns)| Frame { time_ns, color: frame.color, right: frame.right, depth: frame.depth })
             .collect();
-        let mut recording = Self {
+        let recording = Self {
             layout: layout.name,
             folder,
             container: contents.container,
@@ -201,10 +201,10 @@ impl Recording {
             are_photos: contents.are_photos,
             is_chosen_by_size: contents.is_chosen_by_size,
         };
-        if let Some(calibration) = contents.depth_calibration {
-            recording.set_depth_calibration(calibration)?;
+        match options.depth_calibration.or(contents.depth_calibration) {
+            Some(calibration) => recording.with_registered_depth(calibration),
+            None => Ok(recording),
         }
-        Ok(recording)
     }
 
     /// Returns the name of the layout, such as `TUM RGB-D`.

@@ -1,6 +1,7 @@
 //! How recordings are read.
 
 use super::{DepthUnit, RecordingError};
+use crate::calibration::registration::RgbdCalibration;
 
 /// Options for reading a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,9 @@ pub struct Options {
     pub depth_invert: bool,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
+    /// The calibration of a depth camera that looks from another place than the colour camera, if the recording's depth
+    /// is of its view; it replaces the recording's own.
+    pub depth_calibration: Option<RgbdCalibration>,
     /// Largest time difference between a colour picture and its depth map or right picture, in nanoseconds.
     pub pair_tolerance_ns: u64,
     /// Frame period of pictures without times, in nanoseconds, > 0; `None` for that of the layout.
@@ -36,6 +40,7 @@ impl Default for Options {
             depth_unit: DepthUnit::Metres,
             depth_invert: false,
             depth_invalid: None,
+            depth_calibration: None,
             pair_tolerance_ns: 20_000_000,
             period_ns: None,
             size: None,

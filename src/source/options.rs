@@ -112,8 +112,8 @@ pub struct Depth {
     #[cfg_attr(feature = "clap", arg(long, value_name = "HOW", value_parser = names::parse_name::<Fit>))]
     pub depth_fit: Option<Fit>,
     /// Position of the depth camera relative to the colour camera: TOML with the tables [depth] and [color] (width,
-    /// height, fx, fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3
-    /// numbers) [default: both have the same view]
+    /// height, fx, fy, cx, cy, in pixels; distortion, optional) and [depth-to-color] (rotation: 9 numbers row by row;
+    /// translation_m: 3 numbers) [default: what the recording states, else both have the same view]
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE.toml"))]
     pub depth_calibration: Option<PathBuf>,
 }

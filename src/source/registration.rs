@@ -10,7 +10,7 @@ use super::{Options, SourceError};
 use crate::calibration::registration::{RgbdCalibration, RgbdCalibrationError};
 use crate::calibration::{CameraIntrinsics, Distortion};
 use crate::files::input;
-use crate::recording::Recording;
+use crate::recording::{Options as Reading, Recording};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,21 +43,16 @@ struct Pose {
 
 impl Camera {
     /// Returns the camera, or the reason why it is none.
-    fn to_intrinsics(&self) -> Result<CameraIntrinsics, String> {
+    fn to_intrinsics(&self) -> Result<CameraIntrinsics, &'static str> {
         let &Self { width, height, fx, fy, cx, cy, ref distortion } = self;
-        if ![0, 4, 5, 8].contains(&distortion.len()) {
-            return Err(format!(
-                "distortion has {} numbers, and not 4, 5 or 8: k1 k2 p1 p2 k3 k4 k5 k6",
-                distortion.len()
-            ));
-        }
-        let mut coefficients = [0.0; 8];
-        coefficients[..distortion.len()].copy_from_slice(distortion);
+        let distortion = Distortion::from_model("plumb_bob", distortion).map_err(
+            |_| "distortion must have 4, 5, 8, 12 or 14 numbers, in the order of OpenCV: k1 k2 p1 p2 k3 ...",
+        )?;
         Ok(CameraIntrinsics {
             size: Some((width, height)),
             focal_px: DVec2::new(fx, fy),
             center_px: DVec2::new(cx, cy),
-            distortion: Distortion::RadialTangential(coefficients),
+            distortion,
         })
     }
 }
@@ -68,12 +63,8 @@ impl Camera {
 /// The recording cannot be opened, or the calibration does not belong to it.
 pub(super) fn open_recording(folder: &Path, is_used: bool, options: &Options) -> Result<Recording, SourceError> {
     let file = options.depth.depth_calibration.as_deref().filter(|_| is_used);
-    let calibration = file.map(load_calibration).transpose()?;
-    let mut recording = Recording::open(folder, &options.recording_options())?;
-    if let Some(calibration) = calibration {
-        recording.set_depth_calibration(calibration)?;
-    }
-    Ok(recording)
+    let depth_calibration = file.map(load_calibration).transpose()?;
+    Ok(Recording::open(folder, &Reading { depth_calibration, ..options.recording_options() })?)
 }
 
 /// Reads the calibration file `path`.
@@ -102,8 +93,9 @@ pub fn parse_calibration(path: &Path, text: &str) -> Result<RgbdCalibration, Sou
         refuse(error.span().map_or(0, |span| span.start), error.message().trim().replace('\n', ", "))
     })?;
     let pose = file.pose.get_ref();
-    let camera =
-        |table: &Spanned<Camera>| table.get_ref().to_intrinsics().map_err(|what| refuse(table.span().start, what));
+    let camera = |table: &Spanned<Camera>| {
+        table.get_ref().to_intrinsics().map_err(|what| refuse(table.span().start, what.to_owned()))
+    };
     let calibration = RgbdCalibration {
         depth: camera(&file.depth)?,
         color: camera(&file.color)?,

@@ -13,6 +13,7 @@ mod maps;
 mod middlebury;
 mod pictures;
 mod real;
+mod registered;
 mod rgbd;
 mod single_file;
 mod still;

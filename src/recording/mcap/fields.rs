@@ -68,6 +68,16 @@ impl<'a> Fields<'a> {
         self.number().map(u64::from_le_bytes)
     }
 
+    pub fn f64(&mut self) -> Option<f64> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    pub fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut numbers = [0.0; N];
+        numbers.iter_mut().try_for_each(|number| self.f64().map(|read| *number = read))?;
+        Some(numbers)
+    }
+
     /// Reads a number of bytes, and that many bytes.
     pub fn bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.u32()?;

@@ -67,17 +67,11 @@ impl<'a> Preview<'a> {
     }
 
     fn read(fields: &mut Fields<'a>, kind: Kind, encoding: Encoding) -> Option<Self> {
-        const NS_PER_S: u64 = 1_000_000_000;
-        if encoding == Encoding::Ros1 {
-            // A number that counts messages.
-            fields.u32()?;
-        }
-        let (seconds, ns, frame_id) = (fields.i32()?, fields.u32()?, fields.text()?);
+        let (stamp_ns, frame_id) = read_header(fields, encoding)?;
         let (height, width) = match kind {
             Kind::Image => (fields.u32()?, fields.u32()?),
             Kind::CompressedImage => (0, 0),
         };
-        let stamp_ns = u64::try_from(seconds).unwrap_or(0) * NS_PER_S + u64::from(ns);
         Some(Self { stamp_ns, frame_id, size: (width, height), format: fields.text()? })
     }
 }
@@ -125,7 +119,20 @@ impl<'a> Picture<'a> {
     }
 }
 
-fn start(bytes: &[u8], encoding: Encoding) -> Option<Fields<'_>> {
+/// Reads the header of a message: its time in nanoseconds, and its coordinate frame without the slash of ROS 1.
+pub(super) fn read_header<'a>(fields: &mut Fields<'a>, encoding: Encoding) -> Option<(u64, &'a str)> {
+    const NS_PER_S: u64 = 1_000_000_000;
+    if encoding == Encoding::Ros1 {
+        // A number that counts messages.
+        fields.u32()?;
+    }
+    let (seconds, ns, frame_id) = (fields.i32()?, fields.u32()?, fields.text()?);
+    let stamp_ns = u64::try_from(seconds).unwrap_or(0) * NS_PER_S + u64::from(ns);
+    Some((stamp_ns, frame_id.trim_start_matches('/')))
+}
+
+/// Returns the fields of a message.
+pub(super) fn start(bytes: &[u8], encoding: Encoding) -> Option<Fields<'_>> {
     match encoding {
         Encoding::Cdr => Fields::cdr(bytes),
         Encoding::Ros1 => Some(Fields::packed(bytes)),

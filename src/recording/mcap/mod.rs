@@ -1,6 +1,7 @@
 //! Recordings of ROS in an MCAP file (mcap.dev/spec), as rosbag2 writes them: pictures and depth maps on topics, paired
 //! by the times at which they were taken.
 
+mod cameras;
 mod chunk;
 mod definitions;
 mod fields;
@@ -86,12 +87,21 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
         tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
     }
-    if let Some(depth) = depth.filter(|depth| depth.frame_id != color.frame_id) {
+    let mut depth_calibration = None;
+    let is_of_other_camera = |depth: &&Topic| depth.frame_id != color.frame_id && options.depth_calibration.is_none();
+    if let Some(depth) = depth.filter(is_of_other_camera) {
         let (of_depth, of_color) = (depth.frame_id.escape_debug(), color.frame_id.escape_debug());
-        tracing::warn!(
-            "{name}: the depth of {depth} is of another camera ({of_depth}) than the colour ({of_color}), and is taken \
-             as if both had the same view; record a topic of aligned depth"
-        );
+        let views = format!("the depth of {depth} is of another camera ({of_depth}) than the colour ({of_color})");
+        match found.cameras.find_calibration(depth, color) {
+            Ok(calibration) => {
+                tracing::info!("{name}: {views}; it is registered by their camera_info and /tf_static");
+                depth_calibration = Some(calibration);
+            }
+            Err(missing) => tracing::warn!(
+                "{name}: {views}, and is taken as if both had the same view, because {missing}; record aligned depth, \
+                 or give --depth-calibration"
+            ),
+        }
     }
     if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
         tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
@@ -134,6 +144,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     Ok(Contents {
         frames: listed,
         depth: depth_format,
+        depth_calibration,
         unpaired,
         has_times: true,
         container: Some(Box::new(container)),

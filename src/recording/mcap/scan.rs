@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::time::{Duration, Instant};
 
+use super::cameras::{self, Cameras};
 use super::chunk::Chunk;
 use super::fields::Fields;
 use super::message::{Encoding, Kind, MAX_MESSAGE_BYTES, Preview};
@@ -55,6 +56,7 @@ const SLOW: Duration = Duration::from_secs(2);
 pub(super) struct Contents {
     /// Topics of messages with pictures.
     pub topics: Vec<Topic>,
+    pub cameras: Cameras,
     /// Compressed chunks.
     pub chunks: Vec<Chunk>,
     /// Some topics without pictures, with their types.
@@ -96,6 +98,7 @@ pub(super) fn scan(file: &File, name: &str) -> io::Result<Contents> {
         name,
         schemas: HashMap::new(),
         channels: HashMap::new(),
+        camera_channels: HashMap::new(),
         message_count: 0,
         began: Instant::now(),
         has_warned: false,
@@ -119,6 +122,8 @@ struct Scanner<'a> {
     schemas: HashMap<u16, String>,
     /// Positions of topics with pictures, by channel.
     channels: HashMap<u16, usize>,
+    /// Topics that describe cameras, by channel.
+    camera_channels: HashMap<u16, (String, cameras::Kind, Encoding)>,
     message_count: usize,
     began: Instant,
     has_warned: bool,
@@ -205,6 +210,9 @@ impl Scanner<'_> {
             return Some(());
         }
         let kind = self.schemas.get(&schema).map_or("no type", String::as_str);
+        if let Some((camera, encoding)) = cameras::Kind::of_topic(name, kind).zip(Encoding::from_name(encoding)) {
+            self.camera_channels.insert(id, (name.to_owned(), camera, encoding));
+        }
         if let (Some(kind), Some(encoding)) = (Kind::from_type(kind), Encoding::from_name(encoding)) {
             let topics = &mut self.found.topics;
             let is_same = |topic: &Topic| (&*topic.name, topic.kind, topic.encoding) == (name, kind, encoding);
@@ -239,10 +247,10 @@ impl Scanner<'_> {
             self.note_damage(format!("a message at byte {at} is too short"));
             return Ok(read as u64);
         };
-        let Some(&topic) = self.channels.get(&channel).filter(|_| length >= MESSAGE_HEAD_BYTES) else {
-            return Ok(read as u64);
+        let Some(length) = length.checked_sub(MESSAGE_HEAD_BYTES) else { return Ok(read as u64) };
+        let Some(&topic) = self.channels.get(&channel) else {
+            return Ok(read as u64 + self.scan_cameras(reader, channel, length)?);
         };
-        let length = length - MESSAGE_HEAD_BYTES;
         let previewed = length.min(Preview::BYTES as u64) as usize;
         reader.read_exact(&mut bytes[read..read + previewed])?;
         read += previewed;
@@ -268,6 +276,22 @@ impl Scanner<'_> {
             }
         }
         Ok(read as u64)
+    }
+
+    /// Reads a message that may describe cameras; returns the number of bytes read.
+    fn scan_cameras(&mut self, reader: &mut impl Read, channel: u16, length: u64) -> Result<u64, Damage> {
+        let Some((topic, kind, encoding)) = self.camera_channels.get(&channel) else { return Ok(0) };
+        let cameras = &mut self.found.cameras;
+        if length > cameras::MAX_BYTES || cameras.knows(topic, *kind) {
+            return Ok(0);
+        }
+        let mut bytes = vec![0; length as usize];
+        reader.read_exact(&mut bytes)?;
+        if cameras.add(topic, *kind, *encoding, &bytes).is_none() {
+            let what = format!("a message of {} is damaged", topic.escape_debug());
+            self.note_damage(what);
+        }
+        Ok(length)
     }
 
     /// Scans a chunk whose record has its content from `at` to `next`. Returns the position of its records in the file

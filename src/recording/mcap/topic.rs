@@ -93,7 +93,7 @@ impl Topic {
     }
 
     /// Returns the name without what a compression adds, so that the same pictures have the same name.
-    fn base_name(&self) -> &str {
+    pub fn base_name(&self) -> &str {
         ["/compressedDepth", "/compressed"].iter().find_map(|end| self.name.strip_suffix(end)).unwrap_or(&self.name)
     }
 

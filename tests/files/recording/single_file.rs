@@ -13,6 +13,7 @@ use super::{SIZE, Scene, assert_says, color_of, depth_of, times_ns};
 const RAW: &[u8] = include_bytes!("../../../fuzz/seeds/recording_file/raw.mcap");
 const LZ4: &[u8] = include_bytes!("../../../fuzz/seeds/recording_file/lz4.mcap");
 const ZSTD: &[u8] = include_bytes!("../../../fuzz/seeds/recording_file/zstd.mcap");
+const REGISTERED: &[u8] = include_bytes!("../../../fuzz/seeds/recording_file/registered.mcap");
 const RECORD3D: &[u8] = include_bytes!("../../../fuzz/seeds/recording_file/small.r3d");
 
 /// Writes a file in a folder of its own, and opens it.
@@ -243,7 +244,13 @@ fn a_cut_file_is_played_as_far_as_it_is_whole() {
 #[test]
 fn a_changed_byte_is_refused_in_one_line_or_has_no_effect() {
     let scene = Scene::new();
-    for (name, file) in [("take.mcap", RAW), ("take.mcap", LZ4), ("take.mcap", ZSTD), ("take.r3d", RECORD3D)] {
+    for (name, file) in [
+        ("take.mcap", RAW),
+        ("take.mcap", LZ4),
+        ("take.mcap", ZSTD),
+        ("take.mcap", REGISTERED),
+        ("take.r3d", RECORD3D),
+    ] {
         for at in (0..file.len()).step_by((file.len() / 200).max(1)) {
             let mut damaged = file.to_vec();
             damaged[at] ^= 0xA5;
