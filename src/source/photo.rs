@@ -139,9 +139,7 @@ impl ReadPhoto {
         }
         findings.focus = focus.map(|focus| match focus {
             Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },
-            Focus::Distance(distance) if self.depth_from.is_relative() => {
-                FocusRule::Relative((1.0 - DepthMap::SUBJECT_M / distance).clamp(0.0, 1.0))
-            }
+            Focus::Distance(distance) if self.depth_from.is_relative() => FocusRule::at_relative(distance),
             Focus::Distance(distance) => FocusRule::Metres(distance),
         });
         if let Some(FocusRule::Point { x, y }) = findings.focus {

@@ -42,7 +42,7 @@ struct Pose {
 }
 
 impl Camera {
-    /// Returns the camera, or the reason why it is none.
+    /// Returns the camera, or the reason why it cannot be one.
     fn to_intrinsics(&self) -> Result<CameraIntrinsics, &'static str> {
         let &Self { width, height, fx, fy, cx, cy, ref distortion } = self;
         let distortion = Distortion::from_model("plumb_bob", distortion).map_err(

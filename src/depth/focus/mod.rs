@@ -65,6 +65,11 @@ const ACCEPTED: &str = "METRES above 0 (in relative depth a place from 0, the ne
                         width and height (0 to 1), or track:X,Y";
 
 impl FocusRule {
+    /// Returns the focus on what is at a distance of relative depth, in units of the nearest.
+    pub fn at_relative(distance: f32) -> Self {
+        Self::Relative((1.0 - DepthMap::SUBJECT_M / distance).clamp(0.0, 1.0))
+    }
+
     /// Reads a number, which [`FocusRule::for_depth`] gives its meaning; `None` if it has none.
     fn from_number(number: f32) -> Option<Self> {
         // There are no 0 m.

@@ -244,13 +244,9 @@ fn a_cut_file_is_played_as_far_as_it_is_whole() {
 #[test]
 fn a_changed_byte_is_refused_in_one_line_or_has_no_effect() {
     let scene = Scene::new();
-    for (name, file) in [
-        ("take.mcap", RAW),
-        ("take.mcap", LZ4),
-        ("take.mcap", ZSTD),
-        ("take.mcap", REGISTERED),
-        ("take.r3d", RECORD3D),
-    ] {
+    for (name, file) in
+        [("take.mcap", RAW), ("take.mcap", LZ4), ("take.mcap", ZSTD), ("take.mcap", REGISTERED), ("take.r3d", RECORD3D)]
+    {
         for at in (0..file.len()).step_by((file.len() / 200).max(1)) {
             let mut damaged = file.to_vec();
             damaged[at] ^= 0xA5;

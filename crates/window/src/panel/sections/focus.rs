@@ -1,4 +1,4 @@
-//! The focus: distance of the focal plane, and focus range.
+//! The focus: distance or place of the focal plane, and focus range.
 
 use egui::Ui;
 
@@ -19,18 +19,26 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
         FocusRule::Auto | FocusRule::Relative(_) => (false, now_m),
     };
     let point = if is_point { focus } else { FocusRule::Point { x: 0.5, y: 0.5 } };
-    let distance = match focus {
-        FocusRule::Metres(_) => focus,
-        _ => FocusRule::Metres((now_m * 100.0).round() / 100.0),
+    let in_metres = !form.is_relative();
+    let by_number = match focus {
+        FocusRule::Metres(_) | FocusRule::Relative(_) => focus,
+        _ if in_metres => FocusRule::Metres((now_m * 100.0).round() / 100.0),
+        _ => FocusRule::at_relative(now_m),
     };
     let rules = [
         ("Subject", "Follows a person, or the nearest large subject", FocusRule::Auto),
         ("Point", "A point of the picture: click there. Double-click on a thing to follow it", point),
-        ("Distance", "A distance in metres", distance),
+        match in_metres {
+            true => ("Distance", "A distance in metres", by_number),
+            false => ("Place", "A place between the nearest and the farthest", by_number),
+        },
     ];
-    let in_metres = !form.is_relative();
-    let rules = if in_metres { &rules[..] } else { &rules[..2] };
-    form.add_choice(ui, "Focus on", rules, focus, |look, rule| look.focus = rule);
+    form.add_choice(ui, "Focus on", &rules, focus, |look, rule| look.focus = rule);
+    if let (false, FocusRule::Relative(place)) = (in_metres, by_number) {
+        let hint = "Place of the focal plane: 0 is the nearest, 1 the farthest. Move the slider to set it";
+        let how = Number::new("Place", hint, 0.0..=1.0, 2);
+        form.add_number(ui, &how, place, |look, place| look.focus = FocusRule::Relative(place));
+    }
     if in_metres {
         let hint = "Distance of the focal plane. Move the slider to set it";
         let how = Number::new("Distance", hint, FOCUS_DISTANCE_RANGE_M, 2).with_affixes("", " m").logarithmic();

@@ -100,6 +100,26 @@ impl Window {
 }
 
 #[test]
+fn relative_depth_is_focused_at_a_place_from_0_to_1() {
+    let mut state = crate::state::sample::state();
+    (state.camera.is_relative, state.focus_m) = (true, Some(4.0));
+    let mut window = Window::of(state, (1280, 720));
+    window.tab_to("Subject");
+    for _ in 0..2 {
+        window.press(Key::ArrowRight, Modifiers::NONE);
+        window.wait(0.2);
+    }
+    assert_eq!(window.state.look.focus, FocusRule::Relative(0.75), "where it was, at four times the nearest distance");
+    // Over the number to its slider.
+    for key in [Key::Tab, Key::Tab, Key::ArrowLeft] {
+        window.press(key, Modifiers::NONE);
+        window.wait(0.2);
+    }
+    let FocusRule::Relative(place) = window.state.look.focus else { panic!("{:?}", window.state.look.focus) };
+    assert!((0.5..0.75).contains(&place), "the slider moves it nearer: {place}");
+}
+
+#[test]
 fn arrows_choose_among_options_as_in_any_group() {
     let mut window = Window::new();
     window.tab_to("Subject");
