@@ -14,9 +14,6 @@ const MAX_EXACT_PX: f32 = 128.0;
 /// `docs/reliability.md`): as a whole, and of one that is blurred in bands.
 const BYTES_PER_PIXEL: u64 = 90;
 const BANDED_BYTES_PER_PIXEL: u64 = 32;
-/// Pictures of at most this many pixels are not checked: the estimate leaves out memory that does not grow with the
-/// picture.
-const UNCHECKED_PIXELS: u64 = 16 << 20;
 
 impl Settings {
     /// Returns the largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their
@@ -47,9 +44,8 @@ impl Settings {
         let pixels = u64::from(size.0) * u64::from(size.1);
         let is_banded = pixels > MAX_WHOLE_PIXELS as u64;
         let bytes_per_pixel = if is_banded { BANDED_BYTES_PER_PIXEL } else { BYTES_PER_PIXEL };
-        let needed = pixels * (bytes_per_pixel + extra_bytes_per_pixel);
-        match memory::free_bytes().filter(|&free| pixels > UNCHECKED_PIXELS && needed > free) {
-            Some(free) => Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 }),
+        match memory::find_shortage_mb(size, bytes_per_pixel + extra_bytes_per_pixel) {
+            Some((needed_mb, free_mb)) => Err(BokehError::Memory { size, needed_mb, free_mb }),
             None => Ok(()),
         }
     }

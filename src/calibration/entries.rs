@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::Distortion;
 use super::error::{CalibrationError, Fault};
-use super::lens::LensFault;
+use super::lens_model::LensFault;
 use super::tree::Value;
 
 /// Largest deviation of a matrix from a rotation: calibrations are written with few digits.

@@ -16,6 +16,8 @@ mod ini;
 #[cfg(feature = "files")]
 mod kalibr;
 pub mod lens;
+#[cfg(feature = "files")]
+mod lens_model;
 pub mod map;
 #[cfg(feature = "files")]
 mod oak;

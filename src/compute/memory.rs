@@ -16,6 +16,17 @@ pub fn free_bytes() -> Option<u64> {
     Some([own_limit, cgroup_free_bytes()].into_iter().flatten().fold(free, u64::min))
 }
 
+/// Pictures of at most this many pixels are not checked: estimates leave out memory that does not grow with the picture.
+const UNCHECKED_PIXELS: u64 = 16 << 20;
+
+/// Returns the needed and the free memory in megabytes if a picture of `size` (width, height) needs more than is free.
+pub fn find_shortage_mb(size: (u32, u32), bytes_per_pixel: u64) -> Option<(u64, u64)> {
+    let pixels = u64::from(size.0) * u64::from(size.1);
+    let needed = pixels * bytes_per_pixel;
+    let free = free_bytes().filter(|&free| pixels > UNCHECKED_PIXELS && needed > free)?;
+    Some((needed >> 20, free >> 20))
+}
+
 /// Returns the remainder of the limit of this process's control group (version 2). Parent groups are not read: they are
 /// rarely tighter.
 fn cgroup_free_bytes() -> Option<u64> {

@@ -33,7 +33,7 @@ use executors::Executors;
 use postprocess::PostProcessor;
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
-use crate::compute::{Backend, Device, GpuError};
+use crate::compute::{Backend, Device, GpuError, memory};
 use crate::frame::{ColorImage, DisparityMap, GrayImage};
 use crate::names::named;
 
@@ -121,16 +121,36 @@ pub enum MatchError {
         /// Columns and rows of the pictures.
         got: (u32, u32),
     },
+    /// There is not enough memory to match pictures of this size.
+    #[error(
+        "matching pictures of {}x{} needs about {needed_mb} MB of memory, and {free_mb} MB are free; scale both down, or \
+         free some",
+        size.0, size.1
+    )]
+    Memory {
+        /// Width and height.
+        size: (u32, u32),
+        /// Estimated memory of the matching.
+        needed_mb: u64,
+        /// Memory that this process can still allocate.
+        free_mb: u64,
+    },
     /// There is no GPU, or it failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
 
+/// Peak memory per pixel of reading and matching a pair (measured: `docs/reliability.md`).
+const BYTES_PER_PIXEL: u64 = 52;
+
 /// Creates a matcher on the GPU or the CPU; `adapter` is part of a GPU adapter's name.
 ///
 /// # Errors
-/// Fails if a GPU is required and none fits, or if it fails.
+/// Fails if a GPU is required and none fits, if it fails, or if there is not enough memory.
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
+    if let Some((needed_mb, free_mb)) = memory::find_shortage_mb(settings.size, BYTES_PER_PIXEL) {
+        return Err(MatchError::Memory { size: settings.size, needed_mb, free_mb });
+    }
     let workers = ThreadPool::new("match", settings.threads);
     let executors = Executors::new(backend, adapter, workers.thread_count())?;
     let level = |effort| EffortLevel::new(settings, effort, &executors);

@@ -264,15 +264,18 @@ fn settings_are_a_file_of_a_sensible_size() {
     }
 }
 
-/// The blur needs many times the picture's memory, and a stream has several pictures in flight.
+/// Blur and matching need many times the picture's memory, and a stream has several pictures in flight.
 #[test]
 fn a_picture_that_is_larger_than_memory_is_refused() {
     let _alone = alone();
     let home = Home::new();
-    save_wide(&home.path("wide.png"), 5000, png::ColorType::Grayscale);
+    for name in ["wide.png", "right.png"] {
+        save_wide(&home.path(name), 5000, png::ColorType::Grayscale);
+    }
     let blur = "--effect blur --coc-at-infinity 2 --backend cpu";
     for (limit_kb, size, command) in [
         (1_500_000, "5000x5000", format!("render wide.png {blur} --out out.png")),
+        (1_200_000, "5000x5000", "depth wide.png right.png --max-disparity 64 --backend cpu --out out.png".to_owned()),
         // A limit above the memory of one blur, and below that of a stream.
         (3_000_000, "5000x5000", format!("stream synthetic --size 5000x5000 {blur} --frames 1 --to out.y4m")),
     ] {
