@@ -9,7 +9,7 @@ mod draw;
 mod tests;
 mod view;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use pulp::Arch;
 
 use super::CameraIntrinsics;
@@ -120,15 +120,50 @@ pub struct Registration {
     calibration: RgbdCalibration,
     /// Columns and rows of the depth maps.
     size: (u32, u32),
-    /// For each depth pixel the direction of its ray in the colour camera's axes, with a length of 1 along the depth
-    /// camera's axis: x, y and z. NaN where the lens sees nothing.
-    rays: [Vec<f32>; 3],
-    /// For each depth pixel the side of its square relative to that of a pixel without distortion.
-    spreads: Vec<f32>,
+    rays: Rays,
     /// Focal lengths of the depth camera, in pixels.
     depth_focal_px: DVec2,
     view: View,
     arch: Arch,
+}
+
+/// Directions of the depth pixels' rays in the colour camera's axes, with a length of 1 along the depth camera's axis.
+#[derive(Debug)]
+enum Rays {
+    /// Of a depth camera without distortion: `x / z` of each column in its axes, and the ray of the middle of each row.
+    Pinhole { columns: Vec<f32>, rows: Vec<Vec3> },
+    /// For each pixel x, y and z, NaN where the lens sees nothing; and the side of its square relative to that of a pixel
+    /// without distortion.
+    Lens([Vec<f32>; 4]),
+}
+
+impl Rays {
+    fn new(depth: &CameraIntrinsics, (width, height): (u32, u32), rotation: DMat3) -> Self {
+        let CameraIntrinsics { focal_px, center_px, distortion, .. } = *depth;
+        if distortion.is_none() {
+            let down = |y: u32| rotation.y_axis * ((f64::from(y) - center_px.y) / focal_px.y) + rotation.z_axis;
+            return Self::Pinhole {
+                columns: (0..width).map(|x| ((f64::from(x) - center_px.x) / focal_px.x) as f32).collect(),
+                rows: (0..height).map(|y| down(y).as_vec3()).collect(),
+            };
+        }
+        let max_radius = distortion.max_radius();
+        let flat_ray = |x: u32, y: u32| depth.unproject(DVec2::new(x.into(), y.into()), max_radius);
+        // Each row and each column has one more, for the size of the last squares.
+        let flats: Vec<DVec2> = (0..=height).flat_map(|y| (0..=width).map(move |x| flat_ray(x, y))).collect();
+        let row = width as usize + 1;
+        let mut tables = [(); 4].map(|()| Vec::with_capacity(width as usize * height as usize));
+        for at in (0..height as usize).flat_map(|y| (0..width as usize).map(move |x| y * row + x)) {
+            // Rays beyond the lens's reach are all clamped to it.
+            let is_seen = flats[at].length() < max_radius * (1.0 - 1e-9);
+            let ray = if is_seen { rotation * flats[at].extend(1.0) } else { DVec3::NAN };
+            let sides = [flats[at + 1], flats[at + row]].map(|next| ((next - flats[at]) * focal_px).length());
+            for (table, value) in tables.iter_mut().zip([ray.x, ray.y, ray.z, sides[0].max(sides[1])]) {
+                table.push(value as f32);
+            }
+        }
+        Self::Lens(tables)
+    }
 }
 
 impl Registration {
@@ -179,31 +214,7 @@ impl Registration {
         let side = |px: u32| ((f64::from(px) * finer).round() as u32).max(1);
         let view = View::new(&color.resized((side(width), side(height))));
 
-        let max_radius = depth.distortion.max_radius();
-        let is_pinhole = depth.distortion.is_none();
-        let flat_ray = |x: u32, y: u32| {
-            let pixel_px = DVec2::new(x.into(), y.into());
-            match is_pinhole {
-                true => (pixel_px - depth.center_px) / depth.focal_px,
-                false => depth.unproject(pixel_px, max_radius),
-            }
-        };
-        // Each row and each column has one more, for the size of the last squares.
-        let flats: Vec<DVec2> = (0..=size.1).flat_map(|y| (0..=size.0).map(move |x| flat_ray(x, y))).collect();
-        let row = size.0 as usize + 1;
-        let count = size.0 as usize * size.1 as usize;
-        let mut rays = [(); 3].map(|()| Vec::with_capacity(count));
-        let mut spreads = Vec::with_capacity(count);
-        for at in (0..size.1 as usize).flat_map(|y| (0..size.0 as usize).map(move |x| y * row + x)) {
-            // Rays beyond the lens's reach are all clamped to it.
-            let is_seen = is_pinhole || flats[at].length() < max_radius * (1.0 - 1e-9);
-            let ray = if is_seen { rotation * flats[at].extend(1.0) } else { DVec3::NAN };
-            for (table, part) in rays.iter_mut().zip(ray.to_array()) {
-                table.push(part as f32);
-            }
-            let sides = [flats[at + 1], flats[at + row]].map(|next| ((next - flats[at]) * depth.focal_px).length());
-            spreads.push(sides[0].max(sides[1]) as f32);
-        }
-        Self { calibration, size, rays, spreads, depth_focal_px: depth.focal_px, view, arch: Arch::new() }
+        let rays = Rays::new(&depth, size, rotation);
+        Self { calibration, size, rays, depth_focal_px: depth.focal_px, view, arch: Arch::new() }
     }
 }

@@ -2,7 +2,7 @@
 
 use pulp::WithSimd;
 
-use super::Registration;
+use super::{Rays, Registration};
 use crate::frame::DepthMap;
 
 /// Half of a pixel, plus a margin so that slanted surfaces, whose pixels spread, have no gaps.
@@ -29,11 +29,8 @@ impl WithSimd for DrawSquares<'_> {
     // Plain loops over blocks, which the compiler vectorises for the instruction set that `pulp` selects.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self {
-            registration: Registration { calibration, size, rays, spreads, depth_focal_px, view, .. },
-            from,
-            into,
-        } = self;
+        let Self { registration: Registration { calibration, size, rays, depth_focal_px, view, .. }, from, into } =
+            self;
         let offset = calibration.translation_m.as_vec3();
         let (focal_px, center_px) = (view.focal_px.as_vec2(), view.center_px.as_vec2());
         // Half of the footprint of a depth pixel at equal distance from both cameras.
@@ -42,17 +39,31 @@ impl WithSimd for DrawSquares<'_> {
         let mut nearest_m = [0.0_f32; BLOCK];
         let [mut left, mut right, mut top, mut bottom] = [[0_i32; BLOCK]; 4];
         into.fill(f32::INFINITY);
-        let row = (size.0 as usize).max(1);
-        for start in (0..from.len()).step_by(row).flat_map(|start| (start..start + row).step_by(BLOCK)) {
+        let along = calibration.rotation.x_axis.as_vec3();
+        let [mut block_m, mut across, mut down, mut away] = [[0.0_f32; BLOCK]; 4];
+        let mut spread = [1.0_f32; BLOCK];
+        let width_in = (size.0 as usize).max(1);
+        let starts = (0..width_in).step_by(BLOCK);
+        for (y, x) in (0..size.1 as usize).flat_map(|y| starts.clone().map(move |x| (y, x))) {
+            let (start, count) = (y * width_in + x, (width_in - x).min(BLOCK));
             // The rest of a row's last block is unknown.
-            let count = (row - start % row).min(BLOCK);
-            let block = |table: &[f32]| {
-                let mut block = [0.0_f32; BLOCK];
-                block[..count].copy_from_slice(&table[start..start + count]);
-                block
-            };
-            let (block_m, spread) = (block(from), block(spreads));
-            let [across, down, away] = [&rays[0], &rays[1], &rays[2]].map(|table| block(table));
+            block_m[count..].fill(0.0);
+            block_m[..count].copy_from_slice(&from[start..start + count]);
+            match rays {
+                Rays::Pinhole { columns, rows } => {
+                    let row = rows[y];
+                    for (k, column) in columns[x..x + count].iter().enumerate() {
+                        across[k] = along.x * column + row.x;
+                        down[k] = along.y * column + row.y;
+                        away[k] = along.z * column + row.z;
+                    }
+                }
+                Rays::Lens(tables) => {
+                    for (block, table) in [&mut across, &mut down, &mut away, &mut spread].into_iter().zip(tables) {
+                        block[..count].copy_from_slice(&table[start..start + count]);
+                    }
+                }
+            }
             for k in 0..BLOCK {
                 let z_m = block_m[k];
                 let (x_m, y_m) = (across[k] * z_m + offset.x, down[k] * z_m + offset.y);
