@@ -41,6 +41,7 @@ mod photo;
 mod photo_metadata;
 pub mod pictures;
 mod pixel_runs;
+mod raw_image;
 mod record3d;
 mod rgbd;
 mod samples;

@@ -5,7 +5,6 @@ use std::os::unix::fs::FileExt;
 
 use super::chunk::{Chunk, ChunkCache};
 use super::message::Picture;
-use super::pixels::{self, DepthSamples};
 use super::rvl;
 use super::topic::{Message, Topic};
 use crate::frame::{ColorImage, DepthMap};
@@ -13,6 +12,7 @@ use crate::recording::coded::{self, EncodedPicture};
 use crate::recording::container::Container;
 use crate::recording::decode::{self, DepthUnits, Scratch};
 use crate::recording::fault::PictureFault;
+use crate::recording::raw_image::{self, DepthSamples};
 
 /// Bytes of a compressed depth map before its picture: a format and two parameters.
 const COMPRESSED_DEPTH_HEAD_BYTES: usize = 12;
@@ -88,7 +88,7 @@ impl Container for McapFile {
         match self.read_frame(frame, false, &mut scratch.file)?.0 {
             Picture::Image(image) => {
                 decode::check_color_size(image.size, expected)?;
-                pixels::decode_color(&image, into)
+                raw_image::decode_color(&image, into)
             }
             Picture::Compressed { data, .. } => {
                 let coded = EncodedPicture::open_bytes(data)?;
@@ -109,7 +109,7 @@ impl Container for McapFile {
             Picture::Image(image) => {
                 decode::check_depth_size(image.size, size)?;
                 let samples = DepthSamples::from_name(image.format).unwrap_or(DepthSamples::Units);
-                pixels::decode_depth(&image, samples, self.units, into)
+                raw_image::decode_depth(&image, samples, self.units, into)
             }
             Picture::Compressed { format, data } => {
                 let has_head = format.contains("compressedDepth") || topic.name.ends_with("/compressedDepth");
@@ -149,7 +149,7 @@ impl Quantization {
     }
 
     fn depth_m(&self, value: f32) -> f32 {
-        if value == 0.0 { 0.0 } else { pixels::to_depth(self.a / (value - self.b)) }
+        if value == 0.0 { 0.0 } else { raw_image::to_depth(self.a / (value - self.b)) }
     }
 }
 

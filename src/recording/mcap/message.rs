@@ -2,6 +2,7 @@
 
 use super::fields::Fields;
 use crate::recording::MAX_SIDE_PX;
+use crate::recording::raw_image::RawImage;
 
 /// Largest message that is read: four bytes per pixel, and room for a header.
 pub(super) const MAX_MESSAGE_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + (1 << 16);
@@ -79,26 +80,12 @@ impl<'a> Preview<'a> {
 /// A message with a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Picture<'a> {
-    Image(Image<'a>),
+    Image(RawImage<'a>),
     /// A PNG or JPEG, of a depth map after twelve bytes.
     Compressed {
         format: &'a str,
         data: &'a [u8],
     },
-}
-
-/// Pixels row by row.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Image<'a> {
-    /// Width and height.
-    pub size: (u32, u32),
-    /// The name of the pixel format, such as `rgb8`.
-    pub format: &'a str,
-    /// Whether samples of several bytes begin with the most significant one.
-    pub is_big_endian: bool,
-    /// Bytes from a row to the next.
-    pub stride_bytes: usize,
-    pub data: &'a [u8],
 }
 
 impl<'a> Picture<'a> {
@@ -107,7 +94,7 @@ impl<'a> Picture<'a> {
         let mut fields = start(bytes, encoding)?;
         let Preview { size, format, .. } = Preview::read(&mut fields, kind, encoding)?;
         Some(match kind {
-            Kind::Image => Self::Image(Image {
+            Kind::Image => Self::Image(RawImage {
                 size,
                 format,
                 is_big_endian: fields.u8()? != 0,

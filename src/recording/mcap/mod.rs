@@ -8,7 +8,6 @@ mod fields;
 mod file;
 mod file_writer;
 mod message;
-mod pixels;
 mod rvl;
 mod scan;
 mod topic;

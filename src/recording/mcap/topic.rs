@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::message::{Encoding, Kind, Preview};
-use super::pixels::{ColorFormat, DepthSamples};
+use crate::recording::raw_image::{ColorFormat, DepthSamples};
 
 /// A message with a picture, in the file or in a chunk.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,25 @@
-//! Pixels of `sensor_msgs/Image`, by the names of its formats (`sensor_msgs/image_encodings.hpp`).
+//! Pixels without compression inside a file, by the names that ROS has for their formats
+//! (`sensor_msgs/image_encodings.hpp`).
 
-use super::message::Image;
+use super::coded::check_size;
+use super::decode::DepthUnits;
+use super::fault::PictureFault;
 use crate::color::YcbcrMatrix;
 use crate::frame::{ColorImage, DepthMap};
-use crate::recording::coded::check_size;
-use crate::recording::decode::DepthUnits;
-use crate::recording::fault::PictureFault;
+
+/// Pixels row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RawImage<'a> {
+    /// Width and height.
+    pub size: (u32, u32),
+    /// The name of the pixel format, such as `rgb8`.
+    pub format: &'a str,
+    /// Whether samples of several bytes begin with the most significant one.
+    pub is_big_endian: bool,
+    /// Bytes from a row to the next.
+    pub stride_bytes: usize,
+    pub data: &'a [u8],
+}
 
 /// A pixel format of colour or grey.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +86,7 @@ impl DepthSamples {
 }
 
 /// Checks that an image has all its rows of `row_bytes`, and returns them.
-fn rows<'a>(image: &Image<'a>, row_bytes: usize) -> Result<impl Iterator<Item = &'a [u8]>, PictureFault> {
+fn rows<'a>(image: &RawImage<'a>, row_bytes: usize) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, PictureFault> {
     let (stride_bytes, data, height) = (image.stride_bytes, image.data, image.size.1 as usize);
     if stride_bytes < row_bytes {
         return Err(PictureFault::Damaged(format!("rows of {stride_bytes} bytes, and they need {row_bytes}")));
@@ -88,7 +102,7 @@ fn rows<'a>(image: &Image<'a>, row_bytes: usize) -> Result<impl Iterator<Item = 
 }
 
 /// Decodes an image to RGB of 8 bits.
-pub(super) fn decode_color(image: &Image, into: &mut ColorImage) -> Result<(), PictureFault> {
+pub(super) fn decode_color(image: &RawImage, into: &mut ColorImage) -> Result<(), PictureFault> {
     let (width, height) = image.size;
     check_size(width, height)?;
     let format = ColorFormat::from_name(image.format)
@@ -117,6 +131,28 @@ pub(super) fn decode_color(image: &Image, into: &mut ColorImage) -> Result<(), P
     Ok(())
 }
 
+/// Decodes NV12 to RGB, whatever the format is named: all luma, then rows with both chroma samples of two by two pixels.
+/// BT.601, limited range.
+pub(super) fn decode_nv12(image: &RawImage, into: &mut ColorImage) -> Result<(), PictureFault> {
+    let (width, height) = image.size;
+    check_size(width, height)?;
+    let row_bytes = width.next_multiple_of(2) as usize;
+    let luma_bytes = image.stride_bytes.saturating_mul(height as usize);
+    let (luma, chroma) = image.data.split_at_checked(luma_bytes).ok_or(PictureFault::Truncated)?;
+    let luma = rows(&RawImage { data: luma, ..image.clone() }, row_bytes)?;
+    let chroma_size = (width, height.div_ceil(2));
+    let chroma = rows(&RawImage { data: chroma, size: chroma_size, ..image.clone() }, row_bytes)?;
+    into.resize(width, height);
+    let chroma = chroma.flat_map(|row| [row; 2]);
+    for ((luma, chroma), out) in luma.zip(chroma).zip(into.rgb.chunks_exact_mut(3 * width as usize)) {
+        let chroma = chroma.as_chunks::<2>().0.iter().flat_map(|pair| [pair; 2]);
+        for ((&y, &[cb, cr]), out) in luma.iter().zip(chroma).zip(out.as_chunks_mut::<3>().0) {
+            *out = to_rgb([y, cb, cr]);
+        }
+    }
+    Ok(())
+}
+
 /// Converts Y'CbCr of BT.601 in limited range to R'G'B'.
 fn to_rgb([y, cb, cr]: [u8; 3]) -> [u8; 3] {
     let [red_weight, green_weight, blue_weight] = YcbcrMatrix::Bt601.luma_weights().map(|weight| weight as f32);
@@ -129,7 +165,7 @@ fn to_rgb([y, cb, cr]: [u8; 3]) -> [u8; 3] {
 
 /// Decodes a depth map of these samples to metres.
 pub(super) fn decode_depth(
-    image: &Image,
+    image: &RawImage,
     samples: DepthSamples,
     units: DepthUnits,
     into: &mut DepthMap,
@@ -172,11 +208,11 @@ pub(super) fn to_depth(metres: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn image<'a>(format: &'a str, size: (u32, u32), stride_bytes: usize, data: &'a [u8]) -> Image<'a> {
-        Image { size, format, is_big_endian: false, stride_bytes, data }
+    fn image<'a>(format: &'a str, size: (u32, u32), stride_bytes: usize, data: &'a [u8]) -> RawImage<'a> {
+        RawImage { size, format, is_big_endian: false, stride_bytes, data }
     }
 
-    fn color(image: &Image) -> Result<Vec<u8>, PictureFault> {
+    fn color(image: &RawImage) -> Result<Vec<u8>, PictureFault> {
         let mut into = ColorImage::default();
         decode_color(image, &mut into).map(|()| into.rgb)
     }
@@ -195,7 +231,7 @@ mod tests {
         }
         assert_eq!(color(&image("mono8", (2, 1), 2, &[7, 8])).unwrap(), [7, 7, 7, 8, 8, 8]);
         assert_eq!(color(&image("mono16", (2, 1), 4, &[1, 7, 2, 8])).unwrap(), [7, 7, 7, 8, 8, 8]);
-        let big = Image { is_big_endian: true, ..image("mono16", (2, 1), 4, &[7, 1, 8, 2]) };
+        let big = RawImage { is_big_endian: true, ..image("mono16", (2, 1), 4, &[7, 1, 8, 2]) };
         assert_eq!(color(&big).unwrap(), [7, 7, 7, 8, 8, 8]);
     }
 
@@ -222,6 +258,25 @@ mod tests {
     }
 
     #[test]
+    fn four_pixels_share_their_chroma_in_nv12() {
+        // Three columns and rows: white beside red, above black.
+        let luma = [235, 235, 81, 0, 235, 235, 81, 0, 16, 16, 81, 0];
+        let chroma = [128, 128, 90, 240, 128, 128, 90, 240];
+        let data = [&luma[..], &chroma].concat();
+        let mut into = ColorImage::default();
+        decode_nv12(&image("", (3, 3), 4, &data), &mut into).unwrap();
+        let (white, red, black) = ([255; 3], [255, 0, 0], [0; 3]);
+        let expected = [white, white, red, white, white, red, black, black, red];
+        for (found, expected) in into.rgb.iter().zip(expected.as_flattened()) {
+            assert!(found.abs_diff(*expected) <= 2, "{:?}", into.rgb);
+        }
+        for bytes in [data.len() - 1, luma.len(), 5] {
+            let cut = decode_nv12(&image("", (3, 3), 4, &data[..bytes]), &mut into);
+            assert!(matches!(cut, Err(PictureFault::Truncated)), "{bytes}");
+        }
+    }
+
+    #[test]
     fn padding_is_skipped_and_missing_rows_are_refused() {
         let data = [1, 2, 3, 99, 4, 5, 6];
         assert_eq!(color(&image("rgb8", (1, 2), 4, &data)).unwrap(), [1, 2, 3, 4, 5, 6]);
@@ -236,13 +291,13 @@ mod tests {
     fn depth_is_in_millimetres_or_metres() {
         let units = DepthUnits { scale: 1000.0, invalid: Some(65535) };
         let mut map = DepthMap::default();
-        let mut depth = |image: &Image, samples| {
+        let mut depth = |image: &RawImage, samples| {
             decode_depth(image, samples, units, &mut map).unwrap();
             map.metres.clone()
         };
         let data = [0xE8, 3, 0, 0, 0xFF, 0xFF];
         assert_eq!(depth(&image("16UC1", (3, 1), 6, &data), DepthSamples::Units), [1.0, 0.0, 0.0]);
-        let big = Image { is_big_endian: true, ..image("16UC1", (1, 1), 2, &[3, 0xE8]) };
+        let big = RawImage { is_big_endian: true, ..image("16UC1", (1, 1), 2, &[3, 0xE8]) };
         assert_eq!(depth(&big, DepthSamples::Units), [1.0]);
         let values = [1.5, f32::NAN, -1.0, 0.0, f32::INFINITY, f32::NEG_INFINITY];
         let data: Vec<u8> = values.iter().flat_map(|value: &f32| value.to_le_bytes()).collect();
