@@ -50,9 +50,14 @@ pub fn recording(data: &[u8]) {
     }
 }
 
-/// Opens a recording in a single file: MCAP if it begins so, else Record3D.
+/// Opens a recording in a single file: MCAP or Matroska if it begins so, else Record3D.
 pub fn recording_file(data: &[u8]) {
-    let path = write_file(if data.starts_with(b"\x89MCAP") { "take.mcap" } else { "take.r3d" }, data);
+    let name = match data {
+        [0x89, b'M', b'C', b'A', b'P', ..] => "take.mcap",
+        [0x1A, 0x45, 0xDF, 0xA3, ..] => "take.mkv",
+        _ => "take.r3d",
+    };
+    let path = write_file(name, data);
     match Recording::open(&path, &Options::default()) {
         Ok(recording) => check_recording(&recording),
         Err(error) => assert_one_line(error),

@@ -7,7 +7,7 @@ use super::contents::PictureSource;
 use super::decode::Scratch;
 use super::error::RecordingError;
 use super::fault::PictureFault;
-use super::{mcap, record3d};
+use super::{kinect, mcap, record3d};
 use crate::frame::{ColorImage, DepthMap};
 
 /// The pictures of such a recording, by the number of their frame, which must exist. Several threads may read at once.
@@ -54,5 +54,5 @@ pub(super) fn read_first_size<'a>(
 
 /// Returns whether a file is a recording by itself.
 pub fn is_recording_file(path: &Path) -> bool {
-    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT].iter().any(|layout| (layout.matches)(path))
+    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT, kinect::LAYOUT].iter().any(|layout| (layout.matches)(path))
 }

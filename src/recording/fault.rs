@@ -185,6 +185,18 @@ pub enum PictureFault {
         /// Width and height for which the depth camera is calibrated.
         calibrated: (u32, u32),
     },
+    /// The view of a depth camera, without a calibration that says where the colour camera is.
+    #[error(
+        "the depth map is {}x{}, of another view than the picture, and the file {reason}; give a calibration with \
+         --depth-calibration, or use --depth none",
+        found.0, found.1
+    )]
+    Uncalibrated {
+        /// Width and height of the depth map.
+        found: (u32, u32),
+        /// Why the file's calibration is not used.
+        reason: String,
+    },
     /// A mask does not cover its picture.
     #[error(
         "the mask is {}x{}, which does not cover a picture of {}x{}; export it at that size, or smaller with the same aspect",

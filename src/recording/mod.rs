@@ -2,7 +2,7 @@
 //!
 //! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
 //! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists; [`mcap`]
-//! (which can be written) and `record3d` are single files.
+//! (which can be written), `record3d` and `kinect` are single files.
 
 pub mod depth_file;
 #[doc(hidden)]
@@ -30,6 +30,7 @@ mod heif;
 mod icc;
 mod jpeg;
 mod jpeg_intervals;
+mod kinect;
 mod kitti;
 mod list;
 pub mod map_sequence;
@@ -74,9 +75,10 @@ use container::Container;
 use contents::{DepthFormat, Layout, PictureSource, RecordingFolder};
 
 /// The supported layouts, in order of detection.
-const LAYOUTS: [Layout; 8] = [
+const LAYOUTS: [Layout; 9] = [
     mcap::LAYOUT,
     record3d::LAYOUT,
+    kinect::LAYOUT,
     tum::LAYOUT,
     euroc::LAYOUT,
     kitti::LAYOUT,

@@ -1,20 +1,11 @@
 //! Recordings in a single file, which other programs turn into what can be read.
 
 use std::ffi::OsStr;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
-/// The part of a Matroska file in which Azure Kinect's tags are, in bytes.
-const KINECT_HEAD: u64 = 1 << 20;
-
-/// Returns whether a file is such a recording: by its extension, and a `.mkv` by Azure Kinect's tags.
+/// Returns whether a file is such a recording, by its extension.
 pub(super) fn is_container(path: &Path) -> bool {
-    match extension(path).as_str() {
-        "bag" | "db3" | "svo" | "svo2" => true,
-        "mkv" => is_from_kinect(path),
-        _ => false,
-    }
+    ["bag", "db3", "svo", "svo2"].contains(&extension(path).as_str())
 }
 
 /// Describes in one line how the recording becomes a folder that can be read.
@@ -33,14 +24,10 @@ pub(super) fn describe_conversion(path: &Path) -> String {
              --src '{bag}' --dst '{dir}-mcap' --dst-storage mcap; {dir}-mcap is then the source",
             bag = path.parent().filter(|bag| !bag.as_os_str().is_empty()).unwrap_or(Path::new(".")).display()
         ),
-        "svo" | "svo2" => format!(
+        _ => format!(
             "a ZED recording must become a folder of pictures first: mkdir '{dir}' && ZED_SVO_Export '{file}' '{dir}' \
              4 (of the ZED SDK's samples) writes {dir}/left000000.png and {dir}/depth000000.png; {dir} is then the \
              source"
-        ),
-        _ => format!(
-            "a recording of Azure Kinect must become a folder of pictures first: k4a_mkv2image -i='{file}' -s=false \
-             -t=true writes {dir}/color and {dir}/depth, aligned; {dir} is then the source"
         ),
     }
 }
@@ -49,19 +36,10 @@ fn extension(path: &Path) -> String {
     path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase()
 }
 
-/// Returns whether a Matroska file has tags of Azure Kinect, such as `K4A_DEPTH_MODE`.
-fn is_from_kinect(path: &Path) -> bool {
-    const TAG: &[u8] = b"K4A_";
-    let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(KINECT_HEAD).read_to_end(&mut head));
-    read.is_ok() && head.windows(TAG.len()).any(|bytes| bytes == TAG)
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
 
-    use super::*;
     use crate::source::SourceName;
 
     #[test]
@@ -73,7 +51,6 @@ mod tests {
             ("take.db3", "SQLite format 3", "rosbags"),
             ("take.svo", "", "ZED_SVO_Export"),
             ("take.svo2", "", "ZED_SVO_Export"),
-            ("take.mkv", "...K4A_COLOR_MODE...", "k4a_mkv2image"),
         ] {
             let path = dir.path().join(name);
             fs::write(&path, content).unwrap();
@@ -83,9 +60,7 @@ mod tests {
             assert!(!message.contains('\n') && message.contains(converter), "{message}");
             assert!(message.contains(&path.with_extension("").display().to_string()), "{message}");
         }
-        // Other videos are none of these, nor is what only looks like one by its name.
-        fs::write(dir.path().join("film.mkv"), "matroska").unwrap();
-        assert!(!is_container(&dir.path().join("film.mkv")));
+        // A folder may have any name.
         fs::create_dir(dir.path().join("folder.bag")).unwrap();
         assert!(SourceName::parse_os(dir.path().join("folder.bag").as_os_str()).is_ok());
     }

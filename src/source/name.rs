@@ -104,13 +104,13 @@ impl fmt::Display for SourceName {
 fn accepted_sources() -> &'static str {
     match cfg!(feature = "camera") {
         true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
         }
         true => {
-            "a camera, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a camera, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
         }
         false => {
-            "a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic"
+            "a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
         }
     }
 }

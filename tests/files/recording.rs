@@ -6,6 +6,7 @@ mod embedded;
 mod euroc;
 mod faults;
 mod formats;
+mod kinect;
 mod kitti;
 mod kitti_scenes;
 mod layout;

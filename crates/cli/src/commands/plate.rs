@@ -31,7 +31,7 @@ Examples:
 Step out of the picture for about four seconds when the program says so. The camera must not move from then on. In the
 plate of a recording, each pixel is its median over time.")]
 pub struct PlateCommand {
-    /// A camera, or a recording (a folder, .mcap or .r3d)
+    /// A camera, or a recording (a folder, .mcap, .r3d or Kinect's .mkv)
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     /// File for the plate, .png or .jpg

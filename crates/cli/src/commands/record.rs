@@ -33,8 +33,8 @@ Examples:
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt
   bokehcam record somewhere/take.r3d --to take.mcap")]
 pub struct RecordCommand {
-    /// A camera, two cameras LEFT,RIGHT, a recording (a folder, .mcap or .r3d), a video, - (y4m on standard input),
-    /// `demo` or `synthetic`
+    /// A camera, two cameras LEFT,RIGHT, a recording (a folder, .mcap, .r3d or Kinect's .mkv), a video, - (y4m on
+    /// standard input), `demo` or `synthetic`
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     /// Folder for the recording, or an MCAP file

@@ -57,9 +57,9 @@ Examples:
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
-    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a video (FILE.mp4 and others, by
-    /// ffmpeg), a photo, - (y4m on standard input), `demo` (the demonstration) or `synthetic` (a scene, rendered frame
-    /// by frame)
+    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap, .r3d or Kinect's .mkv), a video (FILE.mp4
+    /// and others, by ffmpeg), a photo, - (y4m on standard input), `demo` (the demonstration) or `synthetic` (a scene,
+    /// rendered frame by frame)
     #[arg(value_parser = options::source_name_parser())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]

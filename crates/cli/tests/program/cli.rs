@@ -56,7 +56,7 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
     let cases: [(&[&str], &str); 31] = [
         (
             &["stream", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"), "--to", "null"],
-            "a folder with a recording or pictures, a .mcap or .r3d file, demo or synthetic",
+            "a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic",
         ),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
         (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),

@@ -242,3 +242,22 @@ fn depth_that_a_wrong_scale_makes_is_doubted() {
     let ran = home.run(&["record", "source", "--to", "new", "--force", "-v"]);
     assert!(ran.code == 0 && !ran.stderr.contains("depth-scale"), "{}", ran.stderr);
 }
+
+#[test]
+fn a_recording_of_a_kinect_is_recorded_played_and_taken_for_depth() {
+    const TAKE: &[u8] = include_bytes!("../../../../fuzz/seeds/recording_file/kinect.mkv");
+    let home = Home::new();
+    fs::write(home.path("take.mkv"), TAKE).unwrap();
+    let recorded = home.run(&["record", "take.mkv", "--to", "other"]);
+    assert!(recorded.warning().contains("take.mkv has no calibration"), "{}", recorded.stderr);
+    assert_eq!(read(&home.path("other")).0, 3);
+    fs::rename(home.path("other/rgb"), home.path("film")).unwrap();
+    home.run(&["stream", "film", "--depth", "take.mkv", "--focus", "1", "--to", "null"]).done();
+    fs::write(home.path("cut.mkv"), &TAKE[..1700]).unwrap();
+    let played = home.run(&["stream", "cut.mkv", "--effect", "none", "--to", "null"]);
+    assert!(played.done().contains("2 of 2 frames") && played.stderr.matches("cut.mkv: damaged: ").count() == 1);
+    fs::write(home.path("head.mkv"), &TAKE[..700]).unwrap();
+    home.run(&["stream", "head.mkv", "--to", "null"]).refused(1, &["head.mkv: no colour picture in it is whole"]);
+    home.run(&["record", "take.mkv", "--force", "--to", "take.mkv"]).refused(2, &["take.mkv"]);
+    assert!(fs::read(home.path("take.mkv")).unwrap() == TAKE);
+}

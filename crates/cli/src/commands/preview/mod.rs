@@ -49,8 +49,8 @@ In the window, F1 shows all keys. Click to focus there, double-click on somethin
 A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of its name), two of them as LEFT,RIGHT, a
-    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap or .r3d), a photo, `demo` (the demonstration) or
-    /// `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
+    /// PipeWire camera (pipewire:NAME), a recording (a folder, .mcap, .r3d or Kinect's .mkv), a photo, `demo` (the
+    /// demonstration) or `synthetic` (rendered while it plays) [default: the first camera found, else `demo`]
     source: Option<String>,
     /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv,
     /// .webm or .mov from the start; may be given more than once
