@@ -79,12 +79,16 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         return Err(fault("no depth map in it was taken within half a frame of a colour picture".to_owned()));
     }
     let calibration = match depth {
-        Some(depth) => read_calibration(&file, &found, depth.size, color.size).map(Some),
-        None => Ok(None),
+        Some(depth) if options.depth_calibration.is_none() => {
+            read_calibration(&file, &found, depth.size, color.size).map(Some)
+        }
+        _ => Ok(None),
     };
     let depth_size = depth.map_or((0, 0), |depth| depth.size);
     if let (Err(reason), true) = (&calibration, depth_covers(depth_size, color.size)) {
-        tracing::warn!("{name} {reason}: depth is taken as if it had the view of the colour camera");
+        tracing::warn!(
+            "{name} {reason}: depth is taken as if it had the view of the colour camera (--depth-calibration)"
+        );
     }
     if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
         tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
