@@ -242,9 +242,7 @@ impl StereoCalibration {
         let mut scaled = *self;
         for (side, camera) in scaled.cameras.iter_mut().enumerate() {
             let scale = camera.scale_factor(size)?;
-            camera.size = Some(size);
-            camera.focal_px *= scale;
-            camera.center_px = scale_point_px(camera.center_px, scale);
+            *camera = camera.scaled(size, scale);
             if let Some(given) = &mut scaled.stored_rectification {
                 given.centers_px[side] = scale_point_px(given.centers_px[side], scale);
                 // Both cameras share one rectified focal length: it is scaled once.
@@ -311,6 +309,20 @@ fn sides_px((width, height): (u32, u32)) -> DVec2 {
 }
 
 impl CameraIntrinsics {
+    /// Returns the camera for pictures of `size` (columns, rows), scaled if the aspect is the same.
+    ///
+    /// # Errors
+    /// Same as for [`StereoCalibration::scale_to`].
+    pub(crate) fn scaled_to(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
+        self.scale_factor(size).map(|scale| self.scaled(size, scale))
+    }
+
+    /// Returns the camera for pictures of `size`, which are scaled along columns and rows.
+    fn scaled(&self, size: (u32, u32), scale: DVec2) -> Self {
+        let (focal_px, center_px) = (self.focal_px * scale, scale_point_px(self.center_px, scale));
+        Self { size: Some(size), focal_px, center_px, ..*self }
+    }
+
     /// Returns the scale along columns and rows from the calibration pictures to those of `size`; 1 if their size is
     /// unknown and may be `size`.
     fn scale_factor(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {

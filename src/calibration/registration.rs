@@ -73,13 +73,7 @@ impl CameraIntrinsics {
 
     /// Returns the same camera with pictures of another size, whose aspect may differ.
     fn resized(&self, size: (u32, u32)) -> Self {
-        let scale = self.size.map_or(DVec2::ONE, |from| super::sides_px(size) / super::sides_px(from));
-        Self {
-            size: Some(size),
-            focal_px: self.focal_px * scale,
-            center_px: super::scale_point_px(self.center_px, scale),
-            ..*self
-        }
+        self.scaled(size, self.size.map_or(DVec2::ONE, |from| super::sides_px(size) / super::sides_px(from)))
     }
 }
 
@@ -179,11 +173,6 @@ impl Registration {
     /// Returns columns and rows of the depth maps.
     pub fn size(&self) -> (u32, u32) {
         self.size
-    }
-
-    /// Returns columns and rows of the maps in the colour camera's view.
-    pub fn picture_size(&self) -> (u32, u32) {
-        self.view.picture_size()
     }
 
     /// Reprojects `from`, which has this [`Registration::size`], into `into`, which covers the colour camera's view in

@@ -6,7 +6,7 @@ use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
 use super::error::RecordingError;
 use super::fault::PictureFault;
-use super::{Recording, depth_covers, pfm};
+use super::{Recording, pfm};
 use crate::calibration::registration::{Registration, RgbdCalibration};
 use crate::frame::DepthMap;
 
@@ -39,14 +39,10 @@ impl Recording {
         if self.has_relative_depth() {
             return Err(refuse("registration needs distances, and this depth is relative".to_owned()));
         }
+        let color = calibration.color.scaled_to(self.size).map_err(|error| refuse(error.to_string()))?;
+        let calibration = RgbdCalibration { color, ..calibration };
         let size = calibration.depth.size.unwrap_or_default();
         let registration = Registration::new(calibration, size).map_err(|error| refuse(error.to_string()))?;
-        let ((width, height), (found_width, found_height)) = (calibration.color.size.unwrap_or_default(), self.size);
-        if !depth_covers(registration.picture_size(), self.size) {
-            return Err(refuse(format!(
-                "the colour camera is calibrated for {width}x{height}, and the pictures are {found_width}x{found_height}"
-            )));
-        }
         self.depth_registration = Some(registration);
         Ok(self)
     }

@@ -150,7 +150,7 @@ pub enum RecordingError {
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The calibration of the depth camera does not belong to the recording.
-    #[error("{}: the depth calibration: {what}", dir.display())]
+    #[error("{}: depth camera: {what}", dir.display())]
     DepthCalibration {
         dir: PathBuf,
         /// What is wrong.

@@ -64,11 +64,6 @@ impl View {
         self.drawn_size
     }
 
-    /// Returns columns and rows of the camera's picture.
-    pub fn picture_size(&self) -> (u32, u32) {
-        self.size
-    }
-
     /// Takes the camera's picture from the undistorted one.
     pub fn distort(&self, drawn: &DepthMap, into: &mut DepthMap) {
         into.resize(self.size.0, self.size.1);

@@ -80,17 +80,30 @@ fn a_given_calibration_replaces_the_recordings_own() {
 }
 
 #[test]
+fn a_calibration_of_the_colour_camera_at_another_size_is_scaled() {
+    let large = CameraIntrinsics {
+        size: Some((64, 48)),
+        focal_px: DVec2::splat(80.0),
+        center_px: DVec2::new(31.5, 23.5),
+        ..calibration().color
+    };
+    let given = RgbdCalibration { color: large, ..calibration() };
+    let options = Options { depth_calibration: Some(given), ..Options::default() };
+    assert_registered(&depth_of(&open(FILE, &options).unwrap(), 0).unwrap());
+}
+
+#[test]
 fn calibrations_that_belong_to_other_pictures_are_refused() {
+    let camera = calibration().depth;
+    let sized = |size| CameraIntrinsics { size: Some(size), ..camera };
     let refused = |calibration: RgbdCalibration, parts: &[&str]| {
         let options = Options { depth_calibration: Some(calibration), ..Options::default() };
         let read = open(FILE, &options).and_then(|recording| depth_of(&recording, 0));
         assert_says(read, parts);
     };
-    let camera = calibration().depth;
-    let sized = |size| CameraIntrinsics { size: Some(size), ..camera };
-    refused(RgbdCalibration { color: sized((32, 32)), ..calibration() }, &["calibrated for 32x32", "are 32x24"]);
+    refused(RgbdCalibration { color: sized((32, 32)), ..calibration() }, &["depth camera: ", "32x32", "32x24"]);
     refused(RgbdCalibration { depth: sized((64, 48)), ..calibration() }, &["is 32x24", "calibrated for 64x48"]);
-    refused(RgbdCalibration { rotation: DMat3::ZERO, ..calibration() }, &["the depth calibration: rotation"]);
+    refused(RgbdCalibration { rotation: DMat3::ZERO, ..calibration() }, &["depth camera: rotation"]);
     let scene = Scene::new();
     scene.color("rgb/1.png", (4, 3), 9);
     scene.write("rgb.txt", "0.1 rgb/1.png\n");

@@ -93,6 +93,10 @@ const NEEDS: &[Requirement] = &[
         DepthOrigin::Units if run.uses_depth => None,
         DepthOrigin::Units => Some(DEPTH_UNUSED),
     }),
+    (&["depth-calibration"], |run| match run.source {
+        FrameOrigin::Picture | FrameOrigin::Bench => Some("the map of a single picture shows its view"),
+        FrameOrigin::Source(_) => None,
+    }),
     (&["depth-unit"], |run| match run.depth {
         DepthOrigin::Units | DepthOrigin::Relative | DepthOrigin::Metres => None,
         DepthOrigin::Nothing => Some(NO_DEPTH),

@@ -47,7 +47,7 @@ fn depth_can_come_from_another_recording() {
     assert!(ran.code == 0 && ran.stderr.contains("\n3 of 3 frames delivered"), "{}", ran.stderr);
     for (flags, said) in [
         (&["--depth", "./recording", "--effect", "blur"][..], "only --effect dof"),
-        (&["--depth-calibration", "c.toml"], "--depth-calibration is for a depth camera"),
+        (&["--depth", "none", "--depth-calibration", "c.toml"], "--depth-calibration is for a depth camera"),
     ] {
         let ran = stream(flags);
         assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
