@@ -217,6 +217,16 @@ impl DepthMap {
         Self::SUBJECT_M / if nearness > MIN_NEARNESS { nearness } else { MIN_NEARNESS }
     }
 
+    /// Converts metres to relative inverse depth: the inverse of [`DepthMap::relative_to_metres`], at most 1.
+    pub fn metres_to_relative(metres: f32) -> f32 {
+        if metres < Self::FAR_M { (Self::SUBJECT_M / metres).min(1.0) } else { 0.0 }
+    }
+
+    /// Returns the largest known depth in metres.
+    pub fn farthest_m(&self) -> Option<f32> {
+        self.metres.iter().copied().filter(|&metres| Self::is_known(metres)).reduce(f32::max)
+    }
+
     /// Smallest valid depth in metres: no scene is nearer, and its reciprocal squared is still finite.
     pub const MIN_M: f32 = 1e-6;
     /// Largest valid depth in metres: files that must write a number for infinity use a smaller one.

@@ -207,3 +207,30 @@ impl Registration {
         Self { calibration, size, rays, depth_focal_px: depth.focal_px, view, arch: Arch::new() }
     }
 }
+
+/// Registers maps whose size may change from one to the next.
+#[derive(Debug)]
+pub struct AnySizeRegistration {
+    calibration: RgbdCalibration,
+    /// For maps of the size of the last one.
+    registration: Option<Registration>,
+    scratch: DepthMap,
+}
+
+impl AnySizeRegistration {
+    /// Creates a registration.
+    ///
+    /// # Errors
+    /// Fails if the calibration is invalid.
+    pub fn new(calibration: RgbdCalibration) -> Result<Self, RgbdCalibrationError> {
+        calibration.validate()?;
+        Ok(Self { calibration, registration: None, scratch: DepthMap::default() })
+    }
+
+    /// Reprojects `from` into `into` as [`Registration::register`] does.
+    pub fn register(&mut self, from: &DepthMap, into: &mut DepthMap) {
+        let fitting = self.registration.take().filter(|registration| registration.size() == from.size());
+        let registration = fitting.unwrap_or_else(|| Registration::build(self.calibration, from.size()));
+        self.registration.insert(registration).register(from, &mut self.scratch, into);
+    }
+}

@@ -27,24 +27,41 @@ impl Recording {
         matches!(self.depth, Some(DepthFormat::Units(_)))
     }
 
-    /// Returns the recording with its depth registered: the depth camera looks from another place than the colour camera.
+    /// Returns the recording with its depth registered, if there are distances and a calibration: the depth camera looks
+    /// from another place than the colour camera. The recording's own calibration is not used if it does not fit.
     ///
     /// # Errors
-    /// The calibration is invalid or for pictures of another aspect; or there is no depth, or only relative depth.
-    pub(super) fn with_registered_depth(mut self, calibration: RgbdCalibration) -> Result<Self, RecordingError> {
-        let refuse = |what: String| RecordingError::DepthCalibration { dir: self.folder.dir.clone(), what };
-        if !self.has_depth() {
-            return Err(RecordingError::NoDepth { dir: self.folder.dir.clone() });
+    /// A given calibration is invalid, or for pictures of another aspect.
+    pub(super) fn register_depth(
+        mut self,
+        calibration: Option<RgbdCalibration>,
+        is_given: bool,
+    ) -> Result<Self, RecordingError> {
+        let Some(calibration) = calibration.filter(|_| self.has_depth() && !self.has_relative_depth()) else {
+            return Ok(self);
+        };
+        match self.create_registration(calibration) {
+            Ok(registration) => self.depth_registration = Some(registration),
+            Err(what) if is_given => {
+                return Err(RecordingError::DepthCalibration { dir: self.folder.dir.clone(), what });
+            }
+            Err(what) => tracing::warn!(
+                "{}: depth is taken as if it had the view of the colour camera, because its calibration does not fit: \
+                 {what}; --depth-calibration replaces it",
+                self.folder.dir.display()
+            ),
         }
-        if self.has_relative_depth() {
-            return Err(refuse("registration needs distances, and this depth is relative".to_owned()));
-        }
-        let color = calibration.color.scaled_to(self.size).map_err(|error| refuse(error.to_string()))?;
-        let calibration = RgbdCalibration { color, ..calibration };
-        let size = calibration.depth.size.unwrap_or_default();
-        let registration = Registration::new(calibration, size).map_err(|error| refuse(error.to_string()))?;
-        self.depth_registration = Some(registration);
         Ok(self)
+    }
+
+    fn create_registration(&self, calibration: RgbdCalibration) -> Result<Registration, String> {
+        let color = calibration.color.scaled_to(self.size).map_err(|error| error.to_string())?;
+        let size = calibration.depth.size.unwrap_or_default();
+        // Maps may have been scaled down since.
+        let (mut scratch, mut first) = (Scratch::default(), DepthMap::default());
+        let is_read = self.decode_depth(0, size, &mut scratch, &mut first).is_ok();
+        let size = if is_read { first.size() } else { size };
+        Registration::new(RgbdCalibration { color, ..calibration }, size).map_err(|error| error.to_string())
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
@@ -94,10 +111,15 @@ impl Recording {
                 }
             }
         };
-        let read = read.and_then(|()| match self.depth_registration.is_some() && into.size() != size {
-            true => Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size }),
-            false => Ok(()),
-        });
+        let read = match (read, &self.depth_registration) {
+            (Ok(()), Some(_)) if into.size() != size => {
+                Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size })
+            }
+            (Err(PictureFault::DepthSize { found, .. }), Some(_)) => {
+                Err(PictureFault::CalibratedSize { found, calibrated: size })
+            }
+            (read, _) => read,
+        };
         read.map_err(|fault| source.error(&self.folder.dir, fault))
     }
 }

@@ -93,9 +93,27 @@ impl MapSequence {
     /// Same as for [`depth_file::read`]; or the sequence has no such map, or its distances are of another kind than those
     /// of the first.
     pub fn read(&self, index: usize, color: (u32, u32)) -> Result<DepthFile, RecordingError> {
+        self.read_by(index, |file| depth_file::read(file, &self.options, color))
+    }
+
+    /// Reads the map of the picture `index` in its own size and view.
+    ///
+    /// # Errors
+    /// Same as for [`MapSequence::read`].
+    pub fn read_unfitted(&self, index: usize) -> Result<DepthFile, RecordingError> {
+        self.read_by(index, |file| {
+            depth_file::read_unfitted(file, &self.options).map_err(RecordingError::picture(file))
+        })
+    }
+
+    fn read_by(
+        &self,
+        index: usize,
+        read: impl Fn(&Path) -> Result<DepthFile, RecordingError>,
+    ) -> Result<DepthFile, RecordingError> {
         let count = self.files.len() as u64;
         let file = self.files.get(index).ok_or_else(|| map_count(&self.dir, count, index as u64 + 1))?;
-        let map = depth_file::read(file, &self.options, color)?;
+        let map = read(file)?;
         if map.distances != self.distances {
             let what = "a map of another unit than the others";
             return Err(RecordingError::picture(file)(PictureFault::NotAMap(what.to_owned())));

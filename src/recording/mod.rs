@@ -204,10 +204,8 @@ impl Recording {
             are_photos: contents.are_photos,
             is_chosen_by_size: contents.is_chosen_by_size,
         };
-        match options.depth_calibration.or(contents.depth_calibration) {
-            Some(calibration) => recording.with_registered_depth(calibration),
-            None => Ok(recording),
-        }
+        let is_given = options.depth_calibration.is_some();
+        recording.register_depth(options.depth_calibration.or(contents.depth_calibration), is_given)
     }
 
     /// Returns the name of the layout, such as `TUM RGB-D`.

@@ -28,18 +28,6 @@ pub(super) fn add_external_depth(
     clock: &Clock,
 ) -> Result<Source, SourceError> {
     let Options { depth, depth_choice: choice, .. } = request.options;
-    let is_of_camera = match choice {
-        DepthChoice::Device(_) => true,
-        DepthChoice::Folder(_) => choice.map_folder().is_none(),
-        DepthChoice::Auto | DepthChoice::Recorded => matches!(name, SourceName::Folder(_)),
-        _ => false,
-    };
-    if depth.depth_calibration.is_some() && !is_of_camera {
-        return SourceError::usage_error(
-            "--depth-calibration is for a depth camera, or its recording: name it with --depth, such as --depth \
-             /dev/video2",
-        );
-    }
     if !choice.is_external() {
         return Ok(source);
     }
@@ -106,8 +94,10 @@ fn add_map_sequence(
     request.check_relative_depth(depth_from)?;
     source.findings.notes.extend(notes);
     let size = source.camera.info().size;
+    let registration =
+        if depth_from.is_relative() { None } else { registration::open(&request.options.depth, Some(size))? };
     let first_depth = maps.read(0, size).ok().map(|file| file.map);
-    Ok(Source { depth: Some(Box::new(SequenceDepth(maps))), depth_from, first_depth, ..source })
+    Ok(Source { depth: Some(Box::new(SequenceDepth::new(maps, registration))), depth_from, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with scale and registration from the options.
@@ -115,9 +105,9 @@ fn add_map_sequence(
 fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
     use crate::depth::live::{LiveDepth, Units};
     use crate::v4l2::live::OpenError;
-    let calibration = options.depth_calibration.as_deref().map(registration::load_calibration).transpose()?;
+    let registration = registration::open(options, None)?;
     let units = Units { per_m: options.live_scale(), invalid: options.depth_invalid };
-    match LiveDepth::open(name, units, calibration, clock.clone()) {
+    match LiveDepth::open(name, units, registration, clock.clone()) {
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(

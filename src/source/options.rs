@@ -119,6 +119,17 @@ pub struct Depth {
 }
 
 impl Depth {
+    /// Describes the options of depth maps that have no effect, as depth is `what`; `None` if there are none.
+    pub fn describe_unused(&self, what: &str) -> Option<String> {
+        let given = [
+            (self.depth_unit.is_some(), "--depth-unit"),
+            (self.depth_invert, "--depth-invert"),
+            (self.depth_fit.is_some(), "--depth-fit"),
+        ];
+        let names: Vec<_> = given.into_iter().filter_map(|(is_given, name)| is_given.then_some(name)).collect();
+        (!names.is_empty()).then(|| format!("without effect here: {} (depth is {what})", names.join(", ")))
+    }
+
     /// Returns how to read the depth map of a photo.
     pub fn of_photo(&self) -> depth_file::Options {
         depth_file::Options {

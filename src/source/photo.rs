@@ -117,7 +117,10 @@ pub(super) fn read_photo(path: &Path, request: &OpenRequest) -> Result<ReadPhoto
         return Ok(photo);
     }
     match depth_file::read_inside(path, photo.color.size()) {
-        Ok(Some(inside)) => photo.take_inside(path, inside),
+        Ok(Some(inside)) => {
+            photo.take_inside(path, inside);
+            photo.findings.notes.extend(options.depth.describe_unused("inside the photo, which says what it is"));
+        }
         Ok(None) => {}
         Err(error) => photo.findings.notes.push(error.to_string()),
     }
@@ -139,7 +142,10 @@ impl ReadPhoto {
         }
         findings.focus = focus.map(|focus| match focus {
             Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },
-            Focus::Distance(distance) if self.depth_from.is_relative() => FocusRule::at_relative(distance),
+            Focus::Distance(distance) if self.depth_from.is_relative() => {
+                let farthest = self.depth.as_ref().and_then(DepthMap::farthest_m);
+                FocusRule::at_relative(distance, farthest.unwrap_or(DepthMap::FAR_M))
+            }
             Focus::Distance(distance) => FocusRule::Metres(distance),
         });
         if let Some(FocusRule::Point { x, y }) = findings.focus {

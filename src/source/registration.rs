@@ -6,8 +6,9 @@ use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::options::Depth;
 use super::{Options, SourceError};
-use crate::calibration::registration::{RgbdCalibration, RgbdCalibrationError};
+use crate::calibration::registration::{AnySizeRegistration, RgbdCalibration, RgbdCalibrationError};
 use crate::calibration::{CameraIntrinsics, Distortion};
 use crate::files::input;
 use crate::recording::{Options as Reading, Recording};
@@ -65,6 +66,20 @@ pub(super) fn open_recording(folder: &Path, is_used: bool, options: &Options) ->
     let file = options.depth.depth_calibration.as_deref().filter(|_| is_used);
     let depth_calibration = file.map(load_calibration).transpose()?;
     Ok(Recording::open(folder, &Reading { depth_calibration, ..options.recording_options() })?)
+}
+
+/// Returns the registration by the calibration of the options, for pictures of `size` (columns, rows) if it is known.
+///
+/// # Errors
+/// The file is no calibration, or for pictures of another aspect.
+pub(super) fn open(options: &Depth, size: Option<(u32, u32)>) -> Result<Option<AnySizeRegistration>, SourceError> {
+    let Some(path) = options.depth_calibration.as_deref() else { return Ok(None) };
+    let refuse = |what: String| SourceError::Usage(format!("{}: {what}", path.display()));
+    let mut calibration = load_calibration(path)?;
+    if let Some(size) = size {
+        calibration.color = calibration.color.scaled_to(size).map_err(|error| refuse(error.to_string()))?;
+    }
+    AnySizeRegistration::new(calibration).map(Some).map_err(|error| refuse(error.to_string()))
 }
 
 /// Reads the calibration file `path`.

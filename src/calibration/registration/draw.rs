@@ -1,5 +1,6 @@
 //! Draws squares of depth where the colour camera sees them, with a z-buffer.
 
+use glam::DVec2;
 use pulp::WithSimd;
 
 use super::{Rays, Registration};
@@ -34,7 +35,11 @@ impl WithSimd for DrawSquares<'_> {
         let offset = calibration.translation_m.as_vec3();
         let (focal_px, center_px) = (view.focal_px.as_vec2(), view.center_px.as_vec2());
         // Half of the footprint of a depth pixel at equal distance from both cameras.
-        let half = (f64::from(HALF_PIXEL) * view.focal_px / depth_focal_px).as_vec2();
+        let half = f64::from(HALF_PIXEL) * view.focal_px / depth_focal_px;
+        // That of a square which is turned about the optical axis is what encloses it.
+        let [column, row] =
+            [calibration.rotation.x_axis, calibration.rotation.y_axis].map(|axis| axis.truncate().abs());
+        let half = (half * (column + row).max(DVec2::ONE)).as_vec2();
         let (width, height) = (view.drawn_size().0 as i32, view.drawn_size().1 as i32);
         let mut nearest_m = [0.0_f32; BLOCK];
         let [mut left, mut right, mut top, mut bottom] = [[0_i32; BLOCK]; 4];

@@ -110,6 +110,18 @@ fn a_surface_that_comes_nearer_has_no_gaps() {
 }
 
 #[test]
+fn a_camera_that_is_turned_about_its_axis_leaves_no_gaps() {
+    for degrees in [3.0_f64, 20.0, 45.0, 90.0] {
+        let rotation = DMat3::from_rotation_z(degrees.to_radians());
+        let into =
+            registered(RgbdCalibration { rotation, ..RgbdCalibration::identity(CAMERA) }, &map(80, 60, |_, _| 2.0));
+        // What both see, however they are turned.
+        let inside = |k: &usize| (k % 80).abs_diff(40).pow(2) + (k / 80).abs_diff(30).pow(2) < 27 * 27;
+        assert!((0..80 * 60).filter(inside).all(|k| into.metres[k] == 2.0), "{degrees}");
+    }
+}
+
+#[test]
 fn what_cannot_be_is_refused() {
     let good = RgbdCalibration::identity(CAMERA);
     let refusal = |calibration: RgbdCalibration| Registration::new(calibration, (4, 2)).unwrap_err().to_string();

@@ -22,7 +22,7 @@ use crate::frame::DepthMap;
 pub enum FocusRule {
     /// A distance in metres, > 0.
     Metres(f32),
-    /// A place in relative depth, linear in inverse depth: 0 is the nearest, 1 the farthest.
+    /// A place in relative depth, linear in inverse depth: 0 is the nearest point, 1 the farthest.
     Relative(f32),
     /// The person that a mask shows; without one, the nearest large subject.
     Auto,
@@ -65,9 +65,11 @@ const ACCEPTED: &str = "METRES above 0 (in relative depth a place from 0, the ne
                         width and height (0 to 1), or track:X,Y";
 
 impl FocusRule {
-    /// Returns the focus on what is at a distance of relative depth, in units of the nearest.
-    pub fn at_relative(distance: f32) -> Self {
-        Self::Relative((1.0 - DepthMap::SUBJECT_M / distance).clamp(0.0, 1.0))
+    /// Returns the focus on what is at a distance of relative depth whose farthest point is at `farthest`; both in units of
+    /// the nearest.
+    pub fn at_relative(distance: f32, farthest: f32) -> Self {
+        let [depth, most] = [distance, farthest].map(|distance| 1.0 - DepthMap::metres_to_relative(distance));
+        Self::Relative((depth / most.max(f32::EPSILON)).clamp(0.0, 1.0))
     }
 
     /// Reads a number, which [`FocusRule::for_depth`] gives its meaning; `None` if it has none.
@@ -147,7 +149,10 @@ impl Focus {
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
-            FocusRule::Relative(place) => Some(DepthMap::relative_to_metres(1.0 - place)),
+            FocusRule::Relative(place) => {
+                let far = map.farthest_m().map_or(0.0, DepthMap::metres_to_relative);
+                Some(DepthMap::relative_to_metres(1.0 - place * (1.0 - far)))
+            }
             FocusRule::Auto if map.subject_m.is_some() => map.subject_m,
             FocusRule::Auto => {
                 let Self { subject, hysteresis, .. } = self;
@@ -228,6 +233,20 @@ mod tests {
     fn beside(columns: usize) -> DepthMap {
         let metres = (0..64 * 64).map(|k| if k % 64 < columns { 1.0 } else { 3.0 });
         DepthMap { width: 64, height: 64, metres: metres.collect(), ..DepthMap::default() }
+    }
+
+    #[test]
+    fn a_place_is_between_the_nearest_and_the_farthest_point() {
+        let map = DepthMap { width: 4, height: 1, metres: vec![1.0, 0.0, 2.5, 1.6], ..DepthMap::default() };
+        let focus_m = |place| Focus::new(FocusRule::Relative(place)).focus_m(&map, 0);
+        assert!(focus_m(0.0) == 1.0 && (focus_m(1.0) - 2.5).abs() < 1e-5, "{}", focus_m(1.0));
+        assert!((1.0 / focus_m(0.5) - 0.7).abs() < 1e-6, "halfway in inverse depth: {}", focus_m(0.5));
+        for distance in [1.0, 1.6, 2.5] {
+            let found_m = Focus::new(FocusRule::at_relative(distance, 2.5)).focus_m(&map, 0);
+            assert!((found_m - distance).abs() < 1e-5, "{found_m}");
+        }
+        let unknown = DepthMap::new(4, 1);
+        assert_eq!(Focus::new(FocusRule::Relative(1.0)).focus_m(&unknown, 0), DepthMap::relative_to_metres(0.0));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use std::time::Duration;
 pub use units::Units;
 
 use super::{DepthError, DepthSource, FrameInput};
-use crate::calibration::registration::{Registration, RgbdCalibration};
+use crate::calibration::registration::AnySizeRegistration;
 use crate::clock::Clock;
 use crate::frame::DepthMap;
 use crate::layout::Content;
@@ -33,11 +33,7 @@ const MAX_POLLS: usize = 8;
 pub struct LiveDepth {
     live: LiveDevice,
     units: Units,
-    calibration: Option<RgbdCalibration>,
-    /// For maps of the size of the last one.
-    registration: Option<Registration>,
-    /// Depth before the colour camera's lens distorts it.
-    scratch: DepthMap,
+    registration: Option<AnySizeRegistration>,
     pairing: Pairing,
     clock: Clock,
     /// Whether the loss of depth was logged, but not its return.
@@ -45,25 +41,24 @@ pub struct LiveDepth {
 }
 
 impl LiveDepth {
-    /// Opens the depth camera `name`. Without a calibration its view is assumed to be that of the colour camera.
+    /// Opens the depth camera `name`. Without a registration its view is assumed to be that of the colour camera.
     ///
     /// # Errors
     /// Fails if the camera does not exist, is busy, or does not deliver depth.
     pub fn open(
         name: &str,
         units: Units,
-        calibration: Option<RgbdCalibration>,
+        registration: Option<AnySizeRegistration>,
         clock: Clock,
     ) -> Result<Self, OpenError> {
         let live = LiveDevice::open(name, ModeRequest::for_content(Content::Depth), Vec::new(), clock.clone())?;
-        if calibration.is_none() {
+        if registration.is_none() {
             tracing::info!(
                 "{}: assumed to see the same as the colour camera; if it does not, give --depth-calibration",
                 live.name()
             );
         }
-        let (registration, scratch, pairing) = Default::default();
-        Ok(Self { live, units, calibration, registration, scratch, pairing, clock, is_stale: false })
+        Ok(Self { live, units, registration, pairing: Pairing::default(), clock, is_stale: false })
     }
 
     /// Decodes the maps that the camera has ready into `pairing`; waits up to `timeout` for the first of them.
@@ -117,14 +112,8 @@ impl DepthSource for LiveDepth {
         let Some(nearest) = self.pairing.nearest(captured_ns) else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
-        let size = nearest.size();
-        if let Some(calibration) = self.calibration
-            && self.registration.as_ref().is_none_or(|registration| registration.size() != size)
-        {
-            self.registration = Registration::new(calibration, size).ok();
-        }
-        match &self.registration {
-            Some(registration) => registration.register(nearest, &mut self.scratch, map),
+        match &mut self.registration {
+            Some(registration) => registration.register(nearest, map),
             None => {
                 map.resize(nearest.width, nearest.height);
                 map.metres.copy_from_slice(&nearest.metres);

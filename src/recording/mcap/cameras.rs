@@ -42,8 +42,8 @@ impl Kind {
 struct Info {
     topic: String,
     frame_id: String,
-    /// Of pictures as the lens makes them, and of rectified ones.
-    raw: CameraIntrinsics,
+    /// Of pictures as the lens makes them, or the name of a lens model that is not read; and of rectified ones.
+    raw: Result<CameraIntrinsics, String>,
     rectified: CameraIntrinsics,
 }
 
@@ -71,7 +71,7 @@ impl Cameras {
             Kind::Info => self.infos.push(read_info(topic, &mut fields, encoding)?),
             Kind::Transforms => {
                 for _ in 0..fields.u32()? {
-                    let (child, parent) = read_transform(&mut fields, encoding)?;
+                    let Some((child, parent)) = read_transform(&mut fields, encoding)? else { continue };
                     // The last one counts.
                     if self.parents.len() < MAX_TRANSFORMS || self.parents.contains_key(&child) {
                         self.parents.insert(child, parent);
@@ -111,7 +111,10 @@ impl Cameras {
         let info = found.ok_or_else(|| format!("there is no {}", beside.escape_debug()))?;
         // REP 104 and image_proc: the names of rectified pictures say so.
         let is_rectified = picture.rsplit('/').next().is_some_and(|name| name.contains("rect"));
-        let camera = if is_rectified { info.rectified } else { info.raw };
+        let camera = if is_rectified { Ok(info.rectified) } else { info.raw.clone() };
+        let camera = camera.map_err(|model| {
+            format!("{} has the lens model {:?}, which is not read", info.topic.escape_debug(), model)
+        })?;
         match camera.focal_px.min_element() > 0.0 {
             true => Ok(camera),
             false => Err(format!("{} states no calibration", info.topic.escape_debug())),
@@ -146,22 +149,28 @@ fn read_info(topic: &str, fields: &mut Fields, encoding: Encoding) -> Option<Inf
     };
     let [fx, _, cx, _, fy, cy, ..] = camera;
     let raw = pinhole(DVec2::new(fx, fy), DVec2::new(cx, cy));
+    let is_pinhole = coefficients.iter().all(|&coefficient| coefficient == 0.0);
+    let distortion = match Distortion::from_model(model, &coefficients) {
+        Ok(distortion) => Ok(distortion),
+        // Whatever the model, it does nothing.
+        Err(_) if is_pinhole => Ok(raw.distortion),
+        Err(_) => Err(model.to_owned()),
+    };
     let [fx, _, cx, _, _, fy, cy, ..] = projection;
     Some(Info {
         topic: topic.to_owned(),
         frame_id: frame_id.to_owned(),
-        raw: CameraIntrinsics { distortion: Distortion::from_model(model, &coefficients).ok()?, ..raw },
+        raw: distortion.map(|distortion| CameraIntrinsics { distortion, ..raw }),
         // Drivers of rectified cameras may leave the projection at 0.
         rectified: if fx > 0.0 { pinhole(DVec2::new(fx, fy), DVec2::new(cx, cy)) } else { raw },
     })
 }
 
-/// Returns the child of a transform, and its parent.
-fn read_transform(fields: &mut Fields, encoding: Encoding) -> Option<(String, Parent)> {
+/// Returns the child of a transform, and its parent; neither if its rotation is not set.
+fn read_transform(fields: &mut Fields, encoding: Encoding) -> Option<Option<(String, Parent)>> {
     let (_, parent) = message::read_header(fields, encoding)?;
     let child = fields.text()?;
     let (translation_m, rotation) = (DVec3::from_array(fields.f64s()?), DQuat::from_array(fields.f64s()?));
-    let is_rotation = (rotation.length() - 1.0).abs() < 1e-2;
     let pose = DAffine3::from_mat3_translation(DMat3::from_quat(rotation.normalize()), translation_m);
-    is_rotation.then(|| (child.trim_start_matches('/').to_owned(), (parent.to_owned(), pose)))
+    Some(pose.is_finite().then(|| (child.trim_start_matches('/').to_owned(), (parent.to_owned(), pose))))
 }

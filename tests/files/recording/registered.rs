@@ -80,16 +80,36 @@ fn a_given_calibration_replaces_the_recordings_own() {
 }
 
 #[test]
-fn a_calibration_of_the_colour_camera_at_another_size_is_scaled() {
-    let large = CameraIntrinsics {
-        size: Some((64, 48)),
-        focal_px: DVec2::splat(80.0),
-        center_px: DVec2::new(31.5, 23.5),
-        ..calibration().color
-    };
-    let given = RgbdCalibration { color: large, ..calibration() };
-    let options = Options { depth_calibration: Some(given), ..Options::default() };
-    assert_registered(&depth_of(&open(FILE, &options).unwrap(), 0).unwrap());
+fn a_calibration_at_another_size_is_scaled() {
+    let camera = calibration().color;
+    let (size, focal_px, center_px) = (Some((64, 48)), DVec2::splat(80.0), DVec2::new(31.5, 23.5));
+    let large = CameraIntrinsics { size, focal_px, center_px, ..camera };
+    for (depth, color) in [(camera, large), (large, camera), (large, large)] {
+        let given = RgbdCalibration { depth, color, ..calibration() };
+        let options = Options { depth_calibration: Some(given), ..Options::default() };
+        assert_registered(&depth_of(&open(FILE, &options).unwrap(), 0).unwrap());
+    }
+}
+
+#[test]
+fn a_calibration_of_the_recording_itself_that_does_not_fit_is_left_out() {
+    // The height of the colour camera's first `camera_info`, after its header: 24 becomes 99.
+    let info = FILE.windows(11).position(|bytes| bytes == b"plumb_bob\0\0" || bytes.starts_with(b"plumb_bob")).unwrap();
+    let mut other = FILE.to_vec();
+    let height = info - 12;
+    assert_eq!(other[height..height + 4], 24_u32.to_le_bytes());
+    other[height] = 99;
+    let depth = depth_of(&open(&other, &Options::default()).unwrap(), 0).unwrap();
+    assert_eq!(row(&depth, 10)[12], 1.0, "where the depth camera has it");
+}
+
+#[test]
+fn without_distances_there_is_nothing_to_register() {
+    let scene = Scene::new();
+    scene.color("rgb/1.png", (4, 3), 9);
+    scene.write("rgb.txt", "0.1 rgb/1.png\n");
+    let options = Options { depth_calibration: Some(calibration()), ..Options::default() };
+    assert!(!scene.open_with(&options).unwrap().has_depth());
 }
 
 #[test]
@@ -102,11 +122,6 @@ fn calibrations_that_belong_to_other_pictures_are_refused() {
         assert_says(read, parts);
     };
     refused(RgbdCalibration { color: sized((32, 32)), ..calibration() }, &["depth camera: ", "32x32", "32x24"]);
-    refused(RgbdCalibration { depth: sized((64, 48)), ..calibration() }, &["is 32x24", "calibrated for 64x48"]);
+    refused(RgbdCalibration { depth: sized((40, 40)), ..calibration() }, &["is 32x24", "calibrated for 40x40"]);
     refused(RgbdCalibration { rotation: DMat3::ZERO, ..calibration() }, &["depth camera: rotation"]);
-    let scene = Scene::new();
-    scene.color("rgb/1.png", (4, 3), 9);
-    scene.write("rgb.txt", "0.1 rgb/1.png\n");
-    let options = Options { depth_calibration: Some(calibration()), ..Options::default() };
-    assert_says(scene.open_with(&options), &["has no depth"]);
 }

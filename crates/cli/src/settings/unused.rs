@@ -84,7 +84,13 @@ const NEEDS_OF_SOURCE: &[Requirement] = &[
 
 /// Other conditions.
 const NEEDS: &[Requirement] = &[
-    (&["depth-scale", "depth-invalid"], |run| match run.depth {
+    (&["depth-invalid"], |run| match run.depth {
+        DepthOrigin::Nothing => Some(NO_DEPTH),
+        DepthOrigin::Stereo | DepthOrigin::Networks | DepthOrigin::Plate => Some("there are no depth pictures"),
+        DepthOrigin::Units if !run.uses_depth => Some(DEPTH_UNUSED),
+        DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => None,
+    }),
+    (&["depth-scale"], |run| match run.depth {
         DepthOrigin::Nothing => Some(NO_DEPTH),
         DepthOrigin::Metres | DepthOrigin::Stereo => Some("this depth is already in metres"),
         DepthOrigin::Relative => Some("relative depth has no scale"),
@@ -93,9 +99,12 @@ const NEEDS: &[Requirement] = &[
         DepthOrigin::Units if run.uses_depth => None,
         DepthOrigin::Units => Some(DEPTH_UNUSED),
     }),
-    (&["depth-calibration"], |run| match run.source {
-        FrameOrigin::Picture | FrameOrigin::Bench => Some("the map of a single picture shows its view"),
-        FrameOrigin::Source(_) => None,
+    (&["depth-calibration"], |run| match (run.source, run.depth) {
+        (FrameOrigin::Picture | FrameOrigin::Bench | FrameOrigin::Source(Kind::Photo), _) => {
+            Some("the map of a single picture shows its view")
+        }
+        (FrameOrigin::Source(_), DepthOrigin::Units | DepthOrigin::Metres) if run.uses_depth => None,
+        (FrameOrigin::Source(_), _) => Some("depth does not come from a depth camera, or its recording"),
     }),
     (&["depth-unit"], |run| match run.depth {
         DepthOrigin::Units | DepthOrigin::Relative | DepthOrigin::Metres => None,

@@ -262,6 +262,9 @@ impl RenderCommand {
                 ..unused::RunFacts::default()
             },
         );
+        if self.mask.is_some() {
+            self.depth.describe_unused("that of a mask").iter().for_each(|unused| log::warn(unused));
+        }
         match depth {
             None if self.blur.accepts_any_depth() => unused::warn_of_no_depth(FrameOrigin::Picture),
             Some(_) if self.depth_map.is_some() && !uses_depth => {

@@ -7,6 +7,7 @@ use crate::panel::widgets::{Number, add_remark};
 use crate::state::tweak::{FOCUS_DISTANCE_RANGE_M, FOCUS_RANGE_LIMITS_M};
 use crate::texts::tr_with;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::frame::DepthMap;
 
 /// Adds the focus rule, its distance, and the focus range.
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
@@ -23,7 +24,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let by_number = match focus {
         FocusRule::Metres(_) | FocusRule::Relative(_) => focus,
         _ if in_metres => FocusRule::Metres((now_m * 100.0).round() / 100.0),
-        _ => FocusRule::at_relative(now_m),
+        _ => FocusRule::at_relative(now_m, DepthMap::FAR_M),
     };
     let rules = [
         ("Subject", "Follows a person, or the nearest large subject", FocusRule::Auto),
