@@ -78,10 +78,10 @@ pub struct Decoder {
     process: Process,
     watchdog: Watchdog,
     pictures: PipeReader,
-    /// The times of pictures on their way, in ffmpeg's own time.
+    /// The times of pictures on their way, in the file's own time.
     times_ns: Receiver<Option<i64>>,
-    /// Time of the file's first frame minus ffmpeg's own time, in nanoseconds.
-    ahead_ns: i64,
+    /// Time of the file's first frame in that, in nanoseconds.
+    first_ns: i64,
     path: PathBuf,
     /// Bytes of the picture that have arrived.
     filled: usize,
@@ -126,13 +126,12 @@ impl Decoder {
         let mut process =
             Process::start_logging(&mut command, &Arc::default(), log).map_err(VideoError::start(path))?;
         let stdout = process.stdout().ok_or_else(|| VideoError::io(path)(ErrorKind::BrokenPipe.into()))?;
-        let ahead_s = if conversion.start_s > 0.0 { conversion.start_s } else { -file.offset_s };
         Ok(Self {
             watchdog: process.watchdog(),
             process,
             pictures: PipeReader::from_owned(OwnedFd::from(stdout)),
             times_ns,
-            ahead_ns: (ahead_s * 1e9).round() as i64,
+            first_ns: (file.first_s * 1e9).round() as i64,
             path: path.clone(),
             filled: 0,
             idle_since: None,
@@ -167,7 +166,7 @@ impl Decoder {
             Filled::Whole => {
                 (self.filled, self.frames) = (0, self.frames + 1);
                 let time_ns = self.times_ns.recv_timeout(TIME_TIMEOUT).ok().flatten();
-                let time_ns = time_ns.map(|time_ns| time_ns.saturating_add(self.ahead_ns));
+                let time_ns = time_ns.map(|time_ns| time_ns.saturating_sub(self.first_ns));
                 self.last_ns = time_ns;
                 Ok(Decoded::Picture(time_ns))
             }
@@ -210,8 +209,13 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
     let fps = fps.map_or(String::new(), |fps| format!("fps={fps},"));
     // Otherwise BT.601 is assumed for every size.
     let matrix = if file.assumed_matrix == Some(YcbcrMatrix::Bt709) { ":in_color_matrix=bt709" } else { "" };
+    let seeks = start_s > 0.0 && !file.is_transport_stream;
+    let begin = match start_s > 0.0 && !seeks {
+        true => format!("trim=start={:.6},", file.first_s + start_s),
+        false => String::new(),
+    };
     let filters = format!(
-        "{fps}scale={width}:{height}:flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix},format={},\
+        "{begin}{fps}scale={width}:{height}:flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix},format={},\
          settb=1/1000000000,showinfo=checksum=0",
         pixels.name()
     );
@@ -220,11 +224,13 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
         // The times are messages of level `info`.
         .args(["-nostdin", "-nostats", "-loglevel", "repeat+level+info", "-protocol_whitelist", "file"])
         .args(["-max_pixels", &(u64::from(MAX_SIDE_PX) * u64::from(MAX_SIDE_PX)).to_string()]);
-    if start_s > 0.0 {
+    if seeks {
         command.args(["-ss", &format!("{:.6}", start_s + file.offset_s)]);
     }
     command
-        .arg("-i")
+        // Times stay those of the file: otherwise ffmpeg counts from the first picture or sound that it uses, or from the
+        // start of the file, as the format has it.
+        .args(["-copyts", "-i"])
         .arg(file_url(&file.path))
         // Without a cover picture.
         .args(["-map", "0:V:0", "-vf", &filters, frame_timing_option(), "passthrough", "-f", "rawvideo", "pipe:1"])

@@ -33,8 +33,12 @@ pub struct VideoFile {
     pub frames: Option<u64>,
     /// Length in seconds, if the file states it.
     pub length_s: Option<f64>,
-    /// Time of the first picture after the file's own start, in seconds.
+    /// Time of the first picture in the file's own time, in seconds.
+    pub first_s: f64,
+    /// The same after the file's own start.
     pub offset_s: f64,
+    /// Whether it is a transport stream of MPEG, in which ffmpeg cannot seek to a picture.
+    pub is_transport_stream: bool,
     /// The matrix to assume for Y'CbCr, where the file states none.
     pub assumed_matrix: Option<YcbcrMatrix>,
     /// Whether there is sound.
@@ -46,7 +50,14 @@ struct Answer {
     #[serde(default)]
     streams: Vec<Stream>,
     #[serde(default)]
-    format: Times,
+    format: Container,
+}
+
+#[derive(Default, Deserialize)]
+struct Container {
+    format_name: Option<String>,
+    #[serde(flatten)]
+    times: Times,
 }
 
 #[derive(Deserialize)]
@@ -114,8 +125,10 @@ impl VideoFile {
             size_px: video.displayed_size(size),
             period_ns: rate.map_or(DEFAULT_PERIOD_NS, |rate| ((1e9 / rate) as u64).max(1)),
             frames: video.nb_frames.as_ref().and_then(|frames| frames.parse().ok()).filter(|&frames| frames > 0),
-            length_s: [&video.times, &answer.format].into_iter().find_map(|times| parse_seconds(&times.duration)),
-            offset_s: start_s(&video.times) - start_s(&answer.format),
+            length_s: [&video.times, &answer.format.times].into_iter().find_map(|times| parse_seconds(&times.duration)),
+            first_s: start_s(&video.times),
+            offset_s: start_s(&video.times) - start_s(&answer.format.times),
+            is_transport_stream: answer.format.format_name.as_deref() == Some("mpegts"),
             assumed_matrix: video.color_space.is_none().then(|| YcbcrMatrix::for_height(size.1)),
             has_sound: answer.streams.iter().any(|stream| is_kind(stream, "audio")),
         })
@@ -155,7 +168,7 @@ fn probe_command(path: &Path) -> Command {
         .arg(
             "stream=codec_type,width,height,sample_aspect_ratio,color_space,color_transfer,avg_frame_rate,r_frame_rate,\
              nb_frames,start_time,duration:stream_disposition=attached_pic:stream_side_data=rotation:\
-             format=start_time,duration",
+             format=format_name,start_time,duration",
         )
         .arg(file_url(path))
         .stdout(Stdio::piped());
@@ -236,7 +249,9 @@ mod tests {
             period_ns: 40_000_000,
             frames: Some(50),
             length_s: None,
+            first_s: 0.0,
             offset_s: 0.0,
+            is_transport_stream: false,
             assumed_matrix: None,
             has_sound: false,
         };

@@ -87,6 +87,29 @@ fn sound_stays_with_its_part_of_the_pictures() {
     assert!(home.path("out.webm").exists());
 }
 
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_transport_stream_has_the_pictures_of_the_same_video_in_mp4() {
+    let home = home_with_clip();
+    // The sound begins before the pictures.
+    let mut remux = Command::new("ffmpeg");
+    let clip = home.path("clip.mp4");
+    remux.args(["-v", "error", "-i"]).arg(&clip).args(["-itsoffset", "0.4", "-i"]).arg(&clip);
+    remux.args(["-map", "1:v", "-map", "0:a", "-c", "copy"]).arg(home.path("late.ts"));
+    Ran::of(&mut remux).done();
+    let read = |name: &str| {
+        let dir = home.path(name).join("rgb");
+        (0..).map_while(|frame| fs::read(dir.join(format!("{frame:06}.png"))).ok()).collect::<Vec<_>>()
+    };
+    for (args, count) in [("", 40), ("--start 0.5", 30), ("--start 0.62 --end 1.11", 10)] {
+        for (from, to) in [("clip.mp4", "mp4"), ("late.ts", "ts")] {
+            home.run(&[&["record", from, "--to", to, "--force"], &*words(args)].concat()).done();
+        }
+        assert!(read("ts") == read("mp4"), "{args}");
+        assert_eq!(read("ts").len(), count, "{args}");
+    }
+}
+
 fn words(text: &str) -> Vec<&str> {
     text.split_whitespace().collect()
 }
