@@ -2,11 +2,14 @@
 
 use std::mem;
 
+use image::metadata::Orientation;
+
 use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
 use super::error::RecordingError;
 use super::fault::PictureFault;
-use super::{Recording, pfm};
+use super::upright::upright;
+use super::{Recording, coded, pfm};
 use crate::calibration::registration::{Registration, RgbdCalibration};
 use crate::frame::DepthMap;
 
@@ -100,7 +103,11 @@ impl Recording {
             Some(container) => container.read_depth(index, size, scratch, into),
             None => {
                 let path = self.folder.locate(source)?;
-                match form {
+                // Maps of photos are turned as photos are.
+                let tag = self.are_photos.then(|| coded::read_orientation(&path).ok()).flatten();
+                let turn = upright(tag.unwrap_or(Orientation::NoTransforms));
+                let size = turn.rotated_size(size);
+                let read = match form {
                     DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
                         decode::read_depth(&path, *units, Some(size), scratch, into)
                     }
@@ -108,7 +115,11 @@ impl Recording {
                         decode::read_inverse_depth(&path, *white_is_far, size, scratch, into)
                     }
                     DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, size, scratch, into),
+                };
+                if !turn.is_identity() {
+                    *into = turn.transform_map(mem::take(into), size);
                 }
+                read
             }
         };
         let read = match (read, &self.depth_registration) {

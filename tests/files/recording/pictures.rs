@@ -7,7 +7,9 @@ use std::path::Path;
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::pictures::{input_folders, pattern_folder};
 use bokehcam::recording::still::{read_color, write_photo};
-use bokehcam::recording::{Options, PhotoMetadata, Recording, RecordingError, Unpaired};
+use bokehcam::recording::{Options, PhotoMetadata, Recording, RecordingError, Unpaired, depth_file};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 
 use super::{SIZE, Scene, assert_says, color_of, depth_of, times_ns};
 
@@ -181,6 +183,16 @@ fn photos_of_a_folder_are_turned_as_a_single_one_is() {
         let recording = open(&scene, "take").unwrap();
         assert_eq!(depth_of(&recording, 1).unwrap().metres[0], 3.0);
         assert!(color_of(&recording, 1).unwrap() == read_color(&scene.path("take/IMG_0002.png")).unwrap());
+        // A map with a tag is turned as a single one is.
+        let map = scene.path("take/IMG_0002-depth.png");
+        let mut encoder = PngEncoder::new(fs::File::create(&map).unwrap());
+        encoder.set_exif_metadata(exif(orientation)).unwrap();
+        let units: Vec<u8> = (1..=SIZE.0 * SIZE.1).flat_map(|unit| (unit as u16).to_ne_bytes()).collect();
+        encoder.write_image(&units, SIZE.0, SIZE.1, ExtendedColorType::L16).unwrap();
+        let options = depth_file::Options { scale: Some(1000.0), ..depth_file::Options::default() };
+        let single = depth_file::read(&map, &options, upright).unwrap().map;
+        let found = depth_of(&open(&scene, "take").unwrap(), 1).unwrap();
+        assert!(found.size() == single.size() && found.metres == single.metres, "{orientation}");
         scene.color("take/IMG_0003.png", SIZE, 9);
         let others = open(&scene, "take");
         match orientation {
