@@ -62,8 +62,15 @@ impl Recording {
         let size = calibration.depth.size.unwrap_or_default();
         // Maps may have been scaled down since.
         let (mut scratch, mut first) = (Scratch::default(), DepthMap::default());
-        let is_read = self.decode_depth(0, size, &mut scratch, &mut first).is_ok();
-        let size = if is_read { first.size() } else { size };
+        let size = match self.decode_depth(0, size, &mut scratch, &mut first) {
+            Ok(()) => first.size(),
+            Err(
+                RecordingError::Picture { fault: PictureFault::DepthSize { found, .. }, .. }
+                | RecordingError::Listed { fault: PictureFault::DepthSize { found, .. }, .. },
+            ) => return Err(PictureFault::CalibratedSize { found, calibrated: size }.to_string()),
+            // Told when it is read.
+            Err(_) => size,
+        };
         Registration::new(RgbdCalibration { color, ..calibration }, size).map_err(|error| error.to_string())
     }
 

@@ -1,7 +1,8 @@
 //! Depth of another camera's view: registered by the recording's own calibration, or by one that is given.
 //! `fuzz/seeds/recording_file/registered.mcap` was written by Python's mcap-ros2-support: a wall at 2 m, and before it a
 //! box at 1 m in the columns 12 to 19 and rows 8 to 15 of the depth camera's 32x24 pixels; the colour camera has the same
-//! lens, of 40 pixels, and is 10 cm to the right, so that the box is 4 pixels further left for it, and the wall 2.
+//! lens, of 40 pixels, and is 10 cm to the right, so that the box is 4 pixels further left for it, and the wall 2. It
+//! also has what drivers write: a transform whose rotation is not set, and an unknown lens model without distortion.
 
 use bokehcam::calibration::registration::RgbdCalibration;
 use bokehcam::calibration::{CameraIntrinsics, Distortion};
@@ -93,14 +94,16 @@ fn a_calibration_at_another_size_is_scaled() {
 
 #[test]
 fn a_calibration_of_the_recording_itself_that_does_not_fit_is_left_out() {
-    // The height of the colour camera's first `camera_info`, after its header: 24 becomes 99.
-    let info = FILE.windows(11).position(|bytes| bytes == b"plumb_bob\0\0" || bytes.starts_with(b"plumb_bob")).unwrap();
-    let mut other = FILE.to_vec();
-    let height = info - 12;
-    assert_eq!(other[height..height + 4], 24_u32.to_le_bytes());
-    other[height] = 99;
-    let depth = depth_of(&open(&other, &Options::default()).unwrap(), 0).unwrap();
-    assert_eq!(row(&depth, 10)[12], 1.0, "where the depth camera has it");
+    // The height in the first `camera_info` of either camera, before the model of its lens: 24 becomes 99.
+    for model in [&b"plumb_bob"[..], b"inverse_brown_conrady"] {
+        let info = FILE.windows(model.len()).position(|bytes| bytes == model).unwrap();
+        let mut other = FILE.to_vec();
+        let height = info - 12;
+        assert_eq!(other[height..height + 4], 24_u32.to_le_bytes());
+        other[height] = 99;
+        let depth = depth_of(&open(&other, &Options::default()).unwrap(), 0).unwrap();
+        assert_eq!(row(&depth, 10)[12], 1.0, "where the depth camera has it");
+    }
 }
 
 #[test]
