@@ -29,6 +29,8 @@ const MAX_PLAUSIBLE_M: f32 = 1000.0;
 const MAX_IMPLAUSIBLE: f32 = 0.005;
 /// Share of 256 equal ranges of 16 bits in which a map that was stretched to all of them has values.
 const STRETCHED: usize = 256 * 3 / 10;
+/// Number of different values of 8 bits from which on a map is no sketch of a few surfaces.
+const MIN_STEPS: usize = 16;
 /// Share of unknown depth that is reported.
 const MAX_UNKNOWN: f32 = 0.05;
 
@@ -175,9 +177,18 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
             let count = ranges.iter().filter(|range| **range).count();
             // What a sensor does not see it writes as 0 or 65535, so that neither alone means anything.
             let is_stretched = low == 0.0 && high == 65535.0 && count >= STRETCHED && ranges[240..255].contains(&true);
-            is_stretched.then_some("numbers stretched from 0 to 65535")
+            // 8 bits become 16 by either factor.
+            let is_coarse = [256, 257].iter().any(|step| known().all(|number| number as u32 % step == 0));
+            if is_stretched {
+                Some("numbers stretched from 0 to 65535")
+            } else {
+                (is_coarse && count >= MIN_STEPS).then_some("8 bits stretched to 16")
+            }
         }
         Samples::Float if (low, high) == (0.0, 1.0) => Some("numbers stretched from 0 to 1"),
+        Samples::Float if (low, high) == (0.0, 255.0) && known().all(|number| number.fract() == 0.0) => {
+            Some("whole numbers from 0 to 255")
+        }
         Samples::Float => {
             // A sky has one distance, however large.
             let is_far = |number: f32| number > MAX_PLAUSIBLE_M && number < high;

@@ -212,6 +212,14 @@ fn nearness_is_asked_about_and_never_taken_for_metres() {
     narrow.save(path("narrow.png")).unwrap();
     let map = depth_file::read(&path("narrow.png"), &with_unit(DepthUnit::Inverse), size).unwrap().map;
     assert_eq!(map.metres[255], DepthMap::relative_to_metres(1.0));
+    // 8 bits in a wider number have no unit either, whatever part of their range is used.
+    for step in [256, 257] {
+        Gray16::from_fn(256, 4, |x, _| Luma([(20 + x as u16 / 2) * step])).save(path("wide.png")).unwrap();
+        assert_says(depth_file::read(&path("wide.png"), &Options::default(), size), &["8 bits stretched to 16"]);
+    }
+    let whole: Vec<f32> = (0..4).flat_map(|_| (0..256).map(|x| x as f32)).collect();
+    fs::write(path("255.npy"), npy("<f4", false, "4, 256", &bytes_of(&whole))).unwrap();
+    assert_says(depth_file::read(&path("255.npy"), &Options::default(), size), &["whole numbers from 0 to 255"]);
     // A camera's map with unknown and saturated pixels is not stretched.
     let sensor = Gray16::from_fn(256, 4, |x, _| Luma([[0, 65535, 400 + 40 * x as u16][(x as usize).min(2)]]));
     sensor.save(path("sensor.png")).unwrap();
