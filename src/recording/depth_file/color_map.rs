@@ -38,12 +38,14 @@ pub(super) struct ColorMapped {
     pub ends: [&'static str; 2],
 }
 
-/// Reads the picture `path`, upright by its orientation tag, as numbers that are drawn in the colours of a map.
+/// Reads the picture `path`, which has colours, upright by its orientation tag, as numbers that are drawn in the colours
+/// of a map.
 ///
 /// # Errors
-/// The file cannot be read, or has other colours.
+/// It has other colours.
 pub(super) fn read(path: &Path) -> Result<ColorMapped, PictureFault> {
-    let picture = still::read_upright(path)?;
+    // What is no picture, but has colours, has none of these.
+    let picture = still::read_upright(path).map_err(|_| PictureFault::ColoredDepth)?;
     let pixels = picture.rgb.as_chunks::<3>().0;
     let numbers_of = |map: &[[u8; 3]]| {
         let mut numbers = HashMap::new();

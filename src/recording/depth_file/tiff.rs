@@ -3,8 +3,10 @@
 use std::fs::File;
 use std::io::BufReader;
 
+use image::metadata::Orientation;
 use tiff::TiffError;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
 
 use super::values::{ColorCount, Samples, Values};
 use crate::recording::coded::check_size;
@@ -13,7 +15,7 @@ use crate::recording::fault::PictureFault;
 /// Memory for the decoder besides the pixels: one strip or tile, and the lists of them.
 const MAX_BUFFER_BYTES: usize = 64 << 20;
 
-/// Reads the first picture of a file.
+/// Reads the first picture of a file, upright by its orientation tag.
 pub(super) fn read(file: File) -> Result<Values, PictureFault> {
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(fault)?;
     let (width, height) = decoder.dimensions().map_err(fault)?;
@@ -25,6 +27,8 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
     limits.intermediate_buffer_size = MAX_BUFFER_BYTES;
     limits.ifd_value_size = MAX_BUFFER_BYTES;
     let mut decoder = decoder.with_limits(limits);
+    let tag = decoder.find_tag_unsigned::<u8>(Tag::Orientation).ok().flatten();
+    let orientation = tag.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
     let numbers = |samples, white, stored: Vec<f32>| {
         let channels = (stored.len() / pixels).max(1);
         let mut colors = ColorCount::new(white);
@@ -44,7 +48,7 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
             return Err(PictureFault::Truncated);
         }
         colors.check(pixels)?;
-        Ok(Values { size: (width, height), numbers, samples, stated: None })
+        Ok(Values { size: (width, height), numbers, samples, stated: None }.turned(orientation))
     };
     let floats = |stored| numbers(Samples::Float, 1.0, stored);
     let whole = |stored| numbers(Samples::Whole, 65535.0, stored);

@@ -75,15 +75,16 @@ fn npz(arrays: &[(&str, &[u8])]) -> Vec<u8> {
 }
 
 /// A TIFF with one strip of `bits` per sample; `format` is 1 for whole numbers and 3 for floats.
-fn tiff(bits: u16, format: u16, data: &[u8]) -> Vec<u8> {
+fn tiff(bits: u16, format: u16, orientation: u32, data: &[u8]) -> Vec<u8> {
     let mut file = b"II\x2a\x00\x08\x00\x00\x00".to_vec();
-    let entries: [(u16, u16, u32); 10] = [
+    let entries: [(u16, u16, u32); 11] = [
         (256, 4, SIZE.0),
         (257, 4, SIZE.1),
         (258, 3, u32::from(bits)),
         (259, 3, 1),
         (262, 3, 1),
-        (273, 4, 8 + 2 + 10 * 12 + 4),
+        (273, 4, 8 + 2 + 11 * 12 + 4),
+        (274, 3, orientation),
         (277, 3, 1),
         (278, 4, SIZE.1),
         (279, 4, data.len() as u32),
@@ -101,16 +102,18 @@ fn tiff(bits: u16, format: u16, data: &[u8]) -> Vec<u8> {
     file
 }
 
-fn exr(path: &Path, name: &str, values: &[f32]) {
+/// Writes an EXR of layers, each with these channels.
+fn exr(path: &Path, layers: &[&[(&str, &[f32])]]) {
     use exr::prelude::*;
-    let channel = AnyChannel::new(name, FlatSamples::F32(values.to_vec()));
-    let layer = Layer::new(
-        (SIZE.0 as usize, SIZE.1 as usize),
-        LayerAttributes::named("scene"),
-        Encoding::SMALL_FAST_LOSSLESS,
-        AnyChannels::sort(std::iter::once(channel).collect()),
-    );
-    Image::from_layer(layer).write().to_file(path).unwrap();
+    let size = (SIZE.0 as usize, SIZE.1 as usize);
+    let channel = |(name, values): &(&str, &[f32])| AnyChannel::new(*name, FlatSamples::F32(values.to_vec()));
+    let layers = layers.iter().enumerate().map(|(at, channels)| {
+        let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+        let attributes = LayerAttributes::named(format!("scene {at}").as_str());
+        Layer::new(size, attributes, Encoding::SMALL_FAST_LOSSLESS, channels)
+    });
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    Image::from_layers(attributes, layers.collect::<Vec<_>>()).write().to_file(path).unwrap();
 }
 
 #[test]
@@ -129,7 +132,7 @@ fn floats_of_every_format_are_metres() {
         ("d.npy", npy(">f8", false, "1, 2, 4", &doubles)),
         ("m.npz", npz(&[("camera.npy", &pose), ("depth.npy", &map)])),
         ("o.npz", npz(&[("arr_0.npy", &map)])),
-        ("f.tif", tiff(32, 3, &bytes_of(&DEPTHS_M))),
+        ("f.tif", tiff(32, 3, 1, &bytes_of(&DEPTHS_M))),
         ("p.pfm", [b"Pf\n4 2\n-1.0\n", &bottom_first[..]].concat()),
         // Photoshop's has two lines for the size, and the top row first.
         ("photoshop.pfm", [b"Pf\n4\n2\n-1.0\n", &bytes_of(&DEPTHS_M)[..]].concat()),
@@ -145,11 +148,66 @@ fn floats_of_every_format_are_metres() {
         }
     }
     for channel in ["Z", "V", "View.Depth.Z"] {
-        exr(&path("z.exr"), channel, &DEPTHS_M);
+        exr(&path("z.exr"), &[&[(channel, &DEPTHS_M)]]);
         assert_eq!(read(&path("z.exr"), Options::default()).unwrap().map.metres, DEPTHS_M, "{channel}");
     }
-    exr(&path("z.exr"), "alpha", &DEPTHS_M);
+    exr(&path("z.exr"), &[&[("alpha", &DEPTHS_M)]]);
     assert_says(read(&path("z.exr"), Options::default()), &["z.exr", "without a channel"]);
+}
+
+#[test]
+fn the_colours_of_an_exr_are_depth_only_if_they_are_equal() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("c.exr");
+    let other = DEPTHS_M.map(|depth| 0.7 * depth);
+    for prefix in ["", "Combined.", "View.Combined."] {
+        let [r, g, b] = ["R", "G", "B"].map(|name| format!("{prefix}{name}"));
+        let colors = |green: &'static [f32; 8]| [(&*r, &DEPTHS_M[..]), (&*g, &green[..]), (&*b, &DEPTHS_M[..])];
+        let other: &'static [f32; 8] = Box::leak(Box::new(other));
+        let read_layers = |layers: &[&[(&str, &[f32])]]| {
+            exr(&path, layers);
+            read(&path, Options::default())
+        };
+        assert_says(read_layers(&[&colors(other)]), &["c.exr", "a picture in colours is not depth"]);
+        assert_eq!(read_layers(&[&colors(&DEPTHS_M)]).unwrap().map.metres, DEPTHS_M, "{r}");
+        assert_eq!(read_layers(&[&colors(other)[..1]]).unwrap().map.metres, DEPTHS_M, "{r} alone");
+        // Depth has priority, wherever it is.
+        let depth: [(&str, &[f32]); 1] = [("Depth.Z", other)];
+        assert_eq!(read_layers(&[&colors(other), &depth]).unwrap().map.metres, *other, "{r}");
+        assert_eq!(read_layers(&[&[&colors(other)[..], &depth].concat()]).unwrap().map.metres, *other, "{r}");
+    }
+}
+
+#[test]
+fn a_tiff_is_turned_by_its_orientation_tag() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("m.tif");
+    let (width, height) = (SIZE.0 as usize, SIZE.1 as usize);
+    for (tag, at) in [
+        (1, (|x, y, _, _| (x, y)) as fn(usize, usize, usize, usize) -> (usize, usize)),
+        (2, |x, y, w, _| (w - 1 - x, y)),
+        (3, |x, y, w, h| (w - 1 - x, h - 1 - y)),
+        (4, |x, y, _, h| (x, h - 1 - y)),
+        (5, |x, y, _, _| (y, x)),
+        (6, |x, y, _, h| (h - 1 - y, x)),
+        (7, |x, y, w, h| (h - 1 - y, w - 1 - x)),
+        (8, |x, y, w, _| (y, w - 1 - x)),
+    ] {
+        let size = if tag < 5 { SIZE } else { (SIZE.1, SIZE.0) };
+        let mut upright = [0.0; 8];
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let (column, row) = at(x, y, width, height);
+            upright[row * size.0 as usize + column] = DEPTHS_M[y * width + x];
+        }
+        for (bits, format, data) in
+            [(32, 3, bytes_of(&DEPTHS_M)), (8, 1, DEPTHS_M.map(|depth| (10.0 * depth) as u8).to_vec())]
+        {
+            fs::write(&path, tiff(bits, format, tag, &data)).unwrap();
+            let unit = (bits == 8).then_some(DepthUnit::PerMetre(10.0));
+            let file = depth_file::read(&path, &Options { unit, ..Options::default() }, size).unwrap();
+            assert_eq!((file.map.size(), &file.map.metres[..]), (size, &upright[..]), "{tag}, {bits} bits");
+        }
+    }
 }
 
 #[test]
@@ -159,7 +217,7 @@ fn whole_numbers_need_a_unit_unless_depth_cameras_wrote_them() {
     let millimetres: Vec<u16> = DEPTHS_M.iter().map(|metres| (1000.0 * metres) as u16).collect();
     let little: Vec<u8> = millimetres.iter().flat_map(|code| code.to_le_bytes()).collect();
     fs::write(path("mm.npy"), npy("<u2", false, "2, 4", &little)).unwrap();
-    fs::write(path("mm.tif"), tiff(16, 1, &little)).unwrap();
+    fs::write(path("mm.tif"), tiff(16, 1, 1, &little)).unwrap();
     Gray16::from_raw(4, 2, millimetres.clone()).unwrap().save(path("mm.png")).unwrap();
     let rgba: Vec<u16> = millimetres.iter().flat_map(|&code| [code, code, code, 65535]).collect();
     ImageBuffer::<Rgba<u16>, _>::from_raw(4, 2, rgba).unwrap().save(path("rgba.png")).unwrap();
