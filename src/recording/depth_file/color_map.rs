@@ -66,7 +66,7 @@ pub(super) fn read(path: &Path) -> Result<ColorMapped, PictureFault> {
     let (codes, (name, [first, last], is_first_near)) = found.ok_or(PictureFault::ColoredDepth)?;
     let number = |code: u8| f32::from(if is_first_near { u8::MAX - code } else { code });
     let numbers = codes.into_iter().map(number).collect();
-    let values = Values { size: picture.size(), numbers, samples: Samples::Eight, stated: None };
+    let values = Values { size: picture.size(), numbers, samples: Samples::Eight, ..Values::default() };
     Ok(ColorMapped { values, name, ends: if is_first_near { [first, last] } else { [last, first] } })
 }
 

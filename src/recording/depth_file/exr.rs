@@ -37,7 +37,7 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
     check_grey(channels, channel)?;
     let size = check_side(size.0, size.1)?;
     let numbers = channel.sample_data.values_as_f32().collect();
-    Ok(Values { size, numbers, samples: Samples::Float, stated: None })
+    Ok(Values { size, numbers, samples: Samples::Float, ..Values::default() })
 }
 
 /// Returns whether a channel has this name, within a layer (`View.Depth.Z`) or as one (`depth.V`).

@@ -99,6 +99,7 @@ impl Meaning {
         let range = options.range.or_else(|| self.range_of(&values.numbers, options));
         let is_known = self.known(options);
         let Self { quantity, distances, mut notes } = self;
+        notes.splice(..0, values.note);
         let (width, height) = values.size;
         let mut numbers = values.numbers;
         let map = match quantity {

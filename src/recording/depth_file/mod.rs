@@ -85,10 +85,9 @@ pub struct DepthFile {
 /// nothing in it is usable; it has another aspect ratio, and `options` do not say how it fits.
 pub fn read(path: &Path, options: &Options, color: (u32, u32)) -> Result<DepthFile, RecordingError> {
     let read = || -> Result<DepthFile, PictureFault> {
-        let (values, note) = read_values(path, options)?;
+        let values = read_values(path, options)?;
         let is_stated = values.stated.is_some();
         let mut file = Meaning::decide(&values, options)?.into_depth(values, options);
-        file.notes.splice(..0, note);
         meaning::check_usable(&file.map, is_stated)?;
         fit::fit_to(&mut file, options.fit, color)?;
         Ok(file)
@@ -98,26 +97,24 @@ pub fn read(path: &Path, options: &Options, color: (u32, u32)) -> Result<DepthFi
 
 /// Does the same as [`read`] in the size of the file, which may be of one depth, or of none.
 pub(super) fn read_unfitted(path: &Path, options: &Options) -> Result<DepthFile, PictureFault> {
-    let (values, note) = read_values(path, options)?;
-    let mut file = Meaning::decide(&values, options)?.into_depth(values, options);
-    file.notes.splice(..0, note);
-    Ok(file)
+    let values = read_values(path, options)?;
+    Ok(Meaning::decide(&values, options)?.into_depth(values, options))
 }
 
-/// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth; and what was
-/// assumed.
-fn read_values(path: &Path, options: &Options) -> Result<(Values, Option<String>), PictureFault> {
+/// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth.
+fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
     let colored = match values::read(path) {
         Err(PictureFault::ColoredDepth) if matches!(options.unit, None | Some(DepthUnit::Inverse)) => {
             color_map::read(path)?
         }
-        read => return read.map(|values| (values, None)),
+        read => return read,
     };
     let ColorMapped { values, name, ends: [near, far] } = colored;
     match options.unit.is_some() || options.invert {
         true => {
             let near = if options.invert { far } else { near };
-            Ok((values, Some(format!("has the colours of {name}, of which {near} is taken as near"))))
+            let note = Some(format!("has the colours of {name}, of which {near} is taken as near"));
+            Ok(Values { note, ..values })
         }
         false => Err(PictureFault::ColorMapped { name, ends: Box::new([near, far]) }),
     }
@@ -125,7 +122,7 @@ fn read_values(path: &Path, options: &Options) -> Result<(Values, Option<String>
 
 /// Reads the range of the numbers of relative depth, for [`Options::range`]; `None` if the map has metres.
 pub(super) fn read_range(path: &Path, options: &Options) -> Result<Option<(f32, f32)>, PictureFault> {
-    let (values, _) = read_values(path, options)?;
+    let values = read_values(path, options)?;
     Ok(Meaning::decide(&values, options)?.range_of(&values.numbers, options))
 }
 

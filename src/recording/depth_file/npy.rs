@@ -16,26 +16,15 @@ use crate::recording::fault::PictureFault;
 const MAX_HEADER_BYTES: usize = 1 << 16;
 /// Largest number of arrays that are searched for a map.
 const MAX_ARRAYS: usize = 64;
+/// Largest side of an array that is a camera's matrix or pose rather than a map, if there is another.
+const MAX_MATRIX_SIDE: usize = 4;
 /// Usual names of the map among several arrays, in order of preference.
 const NAMES: [&str; 6] = ["depth", "depth_map", "depths", "prediction", "pred", "disparity"];
 
 /// Parses an array of two dimensions; further ones of length 1 are ignored.
 pub(super) fn parse(file: &[u8]) -> Result<Values, PictureFault> {
-    let header_at = match file.get(6) {
-        Some(1) => 10,
-        Some(2 | 3) => 12,
-        Some(version) => return Err(PictureFault::Damaged(format!("version {version} of NPY is unknown"))),
-        None => return Err(PictureFault::Truncated),
-    };
-    let length = file.get(8..header_at).ok_or(PictureFault::Truncated)?;
-    let length = length.iter().rev().fold(0, |length, byte| length << 8 | usize::from(*byte));
-    if length > MAX_HEADER_BYTES {
-        return Err(PictureFault::Damaged(format!("its header claims {length} bytes")));
-    }
-    let header = file.get(header_at..header_at + length).ok_or(PictureFault::Truncated)?;
-    let header = std::str::from_utf8(header).map_err(|_| PictureFault::Damaged("its header is not text".into()))?;
-    let array = Header::parse(header)?;
-    array.read(&file[header_at + length..])
+    let (header, data) = Header::split(file)?;
+    header.read(data)
 }
 
 /// What the header of an array says.
@@ -51,6 +40,24 @@ struct Header {
 }
 
 impl Header {
+    /// Splits a file, or the beginning of one, into its header and the numbers.
+    fn split(file: &[u8]) -> Result<(Self, &[u8]), PictureFault> {
+        let header_at = match file.get(6) {
+            Some(1) => 10,
+            Some(2 | 3) => 12,
+            Some(version) => return Err(PictureFault::Damaged(format!("version {version} of NPY is unknown"))),
+            None => return Err(PictureFault::Truncated),
+        };
+        let length = file.get(8..header_at).ok_or(PictureFault::Truncated)?;
+        let length = length.iter().rev().fold(0, |length, byte| length << 8 | usize::from(*byte));
+        if length > MAX_HEADER_BYTES {
+            return Err(PictureFault::Damaged(format!("its header claims {length} bytes")));
+        }
+        let header = file.get(header_at..header_at + length).ok_or(PictureFault::Truncated)?;
+        let header = std::str::from_utf8(header).map_err(|_| PictureFault::Damaged("its header is not text".into()))?;
+        Ok((Self::parse(header)?, &file[header_at + length..]))
+    }
+
     fn parse(text: &str) -> Result<Self, PictureFault> {
         let short = || text.trim().chars().take(120).collect::<String>();
         let broken = || PictureFault::Damaged(format!("{:?} is not the header of an array", short()));
@@ -103,7 +110,7 @@ impl Header {
             (_, 1) => Samples::Eight,
             _ => Samples::Whole,
         };
-        Ok(Values { size: (side(columns), side(rows)), numbers, samples, stated: None })
+        Ok(Values { size: (side(columns), side(rows)), numbers, samples, ..Values::default() })
     }
 
     fn number(&self, bytes: &[u8]) -> f32 {
@@ -125,33 +132,53 @@ impl Header {
     }
 }
 
-/// Reads the map in an archive of arrays, each of at most `max_bytes`.
+/// Reads the map in an archive of arrays, each of at most `max_bytes`. Without a usual name it is the first, and a note
+/// names it if there are others.
 pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, PictureFault> {
     let mut archive = ZipArchive::new(file).map_err(zip_fault)?;
-    let mut arrays = Vec::new();
+    let (mut maps, mut first_fault) = (Vec::new(), None);
     for index in 0..archive.len().min(MAX_ARRAYS) {
         let member = archive.by_index(index).map_err(zip_fault)?;
-        let name = String::from_utf8_lossy(member.name_raw()).to_lowercase();
-        if let Some(stem) = name.strip_suffix(".npy") {
-            arrays.push((NAMES.iter().position(|known| *known == stem).unwrap_or(NAMES.len()), index));
-        }
-    }
-    arrays.sort_unstable();
-    let mut first_fault = None;
-    for (_, index) in arrays {
-        let member = archive.by_index(index).map_err(zip_fault)?;
-        if member.size() > max_bytes {
-            return Err(PictureFault::FileSize { bytes: member.size(), max_bytes });
-        }
-        let mut array = Vec::new();
-        member.take(max_bytes).read_to_end(&mut array).map_err(|error| zip_fault(ZipError::Io(error)))?;
-        match parse(&array) {
+        let name = String::from_utf8_lossy(member.name_raw()).into_owned();
+        let Some(stem) = name.to_lowercase().strip_suffix(".npy").map(|stem| name[..stem.len()].to_owned()) else {
+            continue;
+        };
+        let mut start = Vec::new();
+        read_member(member, MAX_HEADER_BYTES as u64, &mut start)?;
+        match Header::split(&start) {
             // Cameras and poses are stored beside the map.
             Err(fault @ PictureFault::NotAMap(_)) => first_fault = first_fault.or(Some(fault)),
-            read => return read,
+            header => {
+                let is_matrix =
+                    header.is_ok_and(|(header, _)| header.shape.iter().all(|&side| side <= MAX_MATRIX_SIDE));
+                let rank = NAMES.iter().position(|known| stem.eq_ignore_ascii_case(known)).unwrap_or(NAMES.len());
+                maps.push((rank, is_matrix, index, stem));
+            }
         }
     }
-    Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())))
+    maps.sort_unstable();
+    let Some((rank, _, index, stem)) = maps.first() else {
+        return Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())));
+    };
+    let member = archive.by_index(*index).map_err(zip_fault)?;
+    if member.size() > max_bytes {
+        return Err(PictureFault::FileSize { bytes: member.size(), max_bytes });
+    }
+    let mut array = Vec::new();
+    read_member(member, max_bytes, &mut array)?;
+    let others = maps.iter().filter(|(_, is_matrix, ..)| !is_matrix).count();
+    let note = (*rank == NAMES.len() && others > 1).then(|| {
+        format!(
+            "has {others} arrays that may be the map, of which {stem:?} is taken, the first; one of the name \"depth\" \
+             has priority"
+        )
+    });
+    Ok(Values { note, ..parse(&array)? })
+}
+
+/// Reads the beginning of a file in an archive.
+fn read_member(member: impl Read, max_bytes: u64, into: &mut Vec<u8>) -> Result<usize, PictureFault> {
+    member.take(max_bytes).read_to_end(into).map_err(|error| zip_fault(ZipError::Io(error)))
 }
 
 fn zip_fault(error: ZipError) -> PictureFault {

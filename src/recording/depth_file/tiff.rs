@@ -48,7 +48,7 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
             return Err(PictureFault::Truncated);
         }
         colors.check(pixels)?;
-        Ok(Values { size: (width, height), numbers, samples, stated: None }.turned(orientation))
+        Ok(Values { size: (width, height), numbers, samples, ..Values::default() }.turned(orientation))
     };
     let floats = |stored| numbers(Samples::Float, 1.0, stored);
     let whole = |stored| numbers(Samples::Whole, 65535.0, stored);

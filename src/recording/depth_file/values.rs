@@ -27,6 +27,8 @@ pub(super) struct Values {
     pub samples: Samples,
     /// The unit that the file states.
     pub stated: Option<MapUnit>,
+    /// What was assumed to find them in the file.
+    pub note: Option<String>,
 }
 
 /// The kind of numbers in a file.
@@ -135,7 +137,7 @@ pub(super) fn decode_codes(coded: EncodedPicture) -> Result<(Values, PhotoMetada
         }
     })?;
     colors.check(numbers.len())?;
-    Ok((Values { size: (width, height), numbers, samples, stated: None }, metadata))
+    Ok((Values { size: (width, height), numbers, samples, ..Values::default() }, metadata))
 }
 
 /// Reads the unit that a PNG of ours states.
