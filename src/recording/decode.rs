@@ -289,10 +289,20 @@ pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFaul
 }
 
 fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
+    decode_luma(coded, pixels, |at, luma, alpha| grey[at] = luma * alpha).map(drop)
+}
+
+/// Decodes an opened picture, and calls `on_pixel` with the place of each pixel, its luma and its alpha, 0 to 1 as stored
+/// (1 without alpha). `pixels` is working memory.
+pub(super) fn decode_luma(
+    coded: EncodedPicture,
+    pixels: &mut Vec<u8>,
+    mut on_pixel: impl FnMut(usize, f32, f32),
+) -> Result<PhotoMetadata, PictureFault> {
     let samples = coded.samples();
     coded.decode_runs(pixels, |run, row| {
-        let pixels = grey[run.first..].iter_mut().step_by(run.step);
-        for (grey, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
+        let places = (run.first..).step_by(run.step);
+        for (at, pixel) in places.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             let sample = |channel: usize| match samples.is_16bit {
                 true => f32::from(sample_u16(pixel, channel)) / 65535.0,
                 false => f32::from(pixel[channel]) / 255.0,
@@ -301,8 +311,7 @@ fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) ->
                 true => luminance(sample(0), sample(1), sample(2)),
                 false => sample(0),
             };
-            *grey = if samples.has_alpha() { luma * sample(samples.channels - 1) } else { luma };
+            on_pixel(at, luma, if samples.has_alpha() { sample(samples.channels - 1) } else { 1.0 });
         }
-    })?;
-    Ok(())
+    })
 }

@@ -197,9 +197,9 @@ pub enum PictureFault {
         /// Why the file's calibration is not used.
         reason: String,
     },
-    /// A mask does not cover its picture.
+    /// A mask has another aspect ratio than its picture.
     #[error(
-        "the mask is {}x{}, which does not cover a picture of {}x{}; export it at that size, or smaller with the same aspect",
+        "the mask is {}x{}, of another aspect ratio than the picture's {}x{}; export it in the picture's, in any size",
         found.0, found.1, color.0, color.1
     )]
     MaskSize {

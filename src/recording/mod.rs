@@ -8,6 +8,7 @@ pub mod depth_file;
 #[doc(hidden)]
 pub mod embedded;
 pub mod geometry;
+pub mod mask_file;
 pub mod mcap;
 pub mod snapshot;
 pub mod still;

@@ -80,17 +80,6 @@ pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Re
     }
 }
 
-/// Does the same as [`check_depth_size`] for a mask.
-///
-/// # Errors
-/// Same as for [`check_depth_size`].
-pub fn check_mask_size(path: &Path, mask: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
-    match depth_covers(mask, color) {
-        true => Ok(()),
-        false => Err(RecordingError::picture(path)(PictureFault::MaskSize { found: mask, color })),
-    }
-}
-
 /// Reads a depth map in metres in its own size, in a format of [`depth_file::read`]. `depth_scale` is for whole numbers,
 /// in units per metre.
 ///

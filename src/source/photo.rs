@@ -11,22 +11,31 @@ use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::recording::depth_file::{self, DepthFile, DepthInside, Distances, EXTENSIONS};
 use crate::recording::embedded::Focus;
-use crate::recording::{snapshot, still};
+use crate::recording::{mask_file, snapshot, still};
 
 /// Suffixes of depth files, after the photo's stem and before [`EXTENSIONS`].
 const DEPTH: [&str; 2] = ["-depth", ".depth"];
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
+/// Extensions of photos that may have a mask.
+const PHOTOS: [&str; 10] = ["jpg", "jpeg", "png", "webp", "tif", "tiff", "heic", "heif", "bmp", "gif"];
+
 /// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth` or `NAME.depth`, of any
-/// format), or the picture of a snapshot before the blur.
+/// format), the mask of a photo that is there (`NAME-mask` or `NAME.mask`), or the picture of a snapshot before the blur.
 pub fn is_companion(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let is_original = || {
         let snapshot = stem.strip_suffix(COLOR).map(|stem| path.with_file_name(format!("{stem}.png")));
         snapshot.is_some_and(|snapshot| snapshot::source_paths(&snapshot).0 == path && snapshot.is_file())
     };
-    stem.ends_with("-depth") || stem.ends_with(".depth") || is_original()
+    let is_mask = || {
+        mask_file::picture_stem(&stem).is_some_and(|photo| {
+            let has = |extension: &str| path.with_file_name(format!("{photo}.{extension}")).is_file();
+            PHOTOS.iter().any(|extension| has(extension) || has(&extension.to_uppercase()))
+        })
+    };
+    DEPTH.iter().any(|suffix| stem.ends_with(suffix)) || is_mask() || is_original()
 }
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.

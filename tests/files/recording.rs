@@ -11,6 +11,7 @@ mod kitti;
 mod kitti_scenes;
 mod layout;
 mod maps;
+mod masks;
 mod middlebury;
 mod pictures;
 mod real;

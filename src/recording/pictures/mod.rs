@@ -1,9 +1,10 @@
 //! A folder of pictures without lists, in natural order of their names, or those of a pattern such as
 //! `DIR/IMG_%04d.jpg`. Depth maps may be beside them: named `NAME-depth` or `NAME.depth`, in a folder `depth` or
-//! `depths` within or beside the folder, or in `DIR-depth`.
+//! `depths` within or beside the folder, or in `DIR-depth`. Masks beside them (`NAME-mask`) are left out.
 
 mod pattern;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Layout, ListedFrame, Locator, PictureSource, RecordingFolder};
@@ -11,7 +12,7 @@ use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::folder::{Pictures, find_pictures, has_pictures};
 use super::rgbd::{self, Scale};
-use super::{Options, decode, timeline};
+use super::{Options, decode, mask_file, timeline};
 use pattern::Pattern;
 
 /// Any folder with pictures: the last layout to try.
@@ -19,7 +20,7 @@ pub(super) const LAYOUT: Layout = Layout {
     name: "pictures",
     expected_files: "PNG or JPEG files",
     matches: |dir| has_pictures(dir, |stem| !is_map(stem)),
-    open: |folder, options| from_names(folder, find_pictures(&folder.dir, |stem| !is_map(stem))?, options),
+    open: |folder, options| from_names(folder, find_photos(&folder.dir)?, options),
 };
 
 /// Suffixes of depth maps in the folder of the pictures.
@@ -27,6 +28,23 @@ pub(super) const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
 
 fn is_map(stem: &str) -> bool {
     MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
+}
+
+/// Returns the names of the pictures in `dir` without depth maps, and without the masks of pictures that are there.
+fn find_photos(dir: &Path) -> Result<Vec<String>, RecordingError> {
+    let names = find_pictures(dir, |stem| !is_map(stem))?;
+    let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
+    let stems: HashSet<String> = names.iter().map(|name| stem(name)).collect();
+    let is_mask = |name: &String| mask_file::picture_stem(&stem(name)).is_some_and(|photo| stems.contains(photo));
+    let (masks, photos): (Vec<String>, Vec<String>) = names.into_iter().partition(is_mask);
+    if !masks.is_empty() {
+        tracing::warn!(
+            "{}: {} masks of pictures are left out: they are for `render --mask`",
+            dir.display(),
+            masks.len()
+        );
+    }
+    Ok(photos)
 }
 
 /// Returns whether `dir` has pictures and their depth maps.

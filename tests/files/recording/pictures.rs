@@ -64,6 +64,15 @@ fn pictures_are_in_natural_order() {
 }
 
 #[test]
+fn masks_beside_their_pictures_are_no_frames() {
+    let scene = with_pictures(&["1.png", "1-mask.png", "2.png", "2.mask.png", "face-mask.png"]);
+    assert_eq!(shades(&open(&scene, "take").unwrap()), [0, 2, 4]);
+    add_maps(&scene, "take", &["1-depth.png", "2-depth.png"]);
+    let recording = open(&scene, "take").unwrap();
+    assert_eq!((recording.len(), recording.has_depth(), shades(&recording)), (2, true, vec![0, 2]));
+}
+
+#[test]
 fn a_pattern_chooses_names() {
     let scene = with_pictures(&["IMG_0007.png", "IMG_0008.png", "IMG_0100.png", "IMG_12345.png", "IMG_1.png", "x.png"]);
     for (pattern, expected) in [

@@ -207,6 +207,30 @@ fn folders_give_each_picture_its_map_or_mask() {
 }
 
 #[test]
+fn masks_beside_their_pictures_are_none_of_them() {
+    let home = with_shots();
+    let mask = color(64, 48, |x, _| if x < 32 { [255; 3] } else { [0; 3] });
+    // The last one is beside no picture of that name.
+    for name in ["a-mask.png", "b.mask.png", "c-mask.jpg", "face-mask.png"] {
+        write_color(&home.path("shots").join(name), &mask, false).unwrap();
+    }
+    let ran = render(&home, &["shots", "--effect", "blur", "--out", "folder"]);
+    assert!(ran.done().contains("4 files left out by their names: depth maps, masks"), "{}", ran.stderr);
+    let results = ["a.jpg", "b.png", "c.jpg", "face-mask.png"];
+    assert_eq!(names(&home.path("folder")), results);
+    render(&home, &["shots/*", "--effect", "blur", "--out", "pattern"]).done();
+    assert_eq!(names(&home.path("pattern")), results);
+    render(&home, &["shots/*-mask.png", "shots/c.jpeg", "--effect", "blur", "--out", "some"]).done();
+    assert_eq!(names(&home.path("some")), ["c.jpg", "face-mask.png"]);
+    // One that is named alone is meant.
+    render(&home, &["shots/a-mask.png", "--effect", "blur", "--out", "alone/"]).done();
+    assert_eq!(names(&home.path("alone")), ["a-mask.png"]);
+    fs::remove_file(home.path("shots/face-mask.png")).unwrap();
+    render(&home, &["shots", "--mask", "shots", "--out", "masked"]).done();
+    assert_eq!(names(&home.path("masked")), results[..3]);
+}
+
+#[test]
 fn ctrl_c_leaves_whole_pictures_and_the_next_run_makes_the_rest() {
     let home = Home::new();
     fs::create_dir(home.path("shots")).unwrap();

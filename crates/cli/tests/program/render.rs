@@ -104,6 +104,35 @@ fn a_mask_says_what_stays_sharp_in_any_size() {
     assert!(difference(&picture, &out, 90..160) > 10.0);
     // The outline follows the picture's colours, although the mask is coarse.
     assert!(difference(&picture, &out, 76..80) < 2.0, "{}", difference(&picture, &out, 76..80));
+    // So do a larger one, a square, one that its tag turns, and the alpha of a picture that was cut out.
+    let left = |x: u32, width: u32| if 2 * x < width { 255 } else { 0 };
+    for (name, width, height) in [("large.png", 320, 192), ("square.png", 64, 64)] {
+        let mask = image::GrayImage::from_fn(width, height, |x, _| [left(x, width)].into());
+        mask.save(home.path(name)).unwrap();
+    }
+    let cut = image::RgbaImage::from_fn(160, 96, |x, _| [30, 20, 10, left(x, 160)].into());
+    cut.save(home.path("cut.png")).unwrap();
+    let exif = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0".to_vec();
+    let metadata = PhotoMetadata { exif: Some(exif), ..PhotoMetadata::default() };
+    let turned = color(96, 160, |_, y| if y < 80 { [0; 3] } else { [255; 3] });
+    for name in ["turned.tif", "turned.png", "turned.jpg"] {
+        write_photo(&home.path(name), &turned, &metadata, false).unwrap();
+    }
+    for (mask, note) in [
+        ("large.png", ""),
+        ("square.png", "64x64 pixels, stretched to the picture's 160x96"),
+        ("cut.png", "its alpha is taken as the mask, not its colours"),
+        ("turned.tif", ""),
+        ("turned.png", ""),
+        ("turned.jpg", ""),
+    ] {
+        let ran = run(&home, &["in.png", "--mask", mask, "--coc-at-infinity", "8", "--out", "out.png", "--force"]);
+        let note = if note.is_empty() { String::new() } else { format!("note: {mask}: {note}\n") };
+        assert!(ran.done().starts_with(&note) && ran.stderr.lines().count() == 1 + note.lines().count(), "{ran:?}");
+        let out = read_photo(&home.path("out.png")).unwrap().0;
+        assert_eq!(difference(&picture, &out, 0..70), 0.0, "{mask}");
+        assert!(difference(&picture, &out, 90..160) > 10.0, "{mask}");
+    }
     for (arguments, expected) in [
         (vec!["in.png", "--mask", "mask.png", "--focus", "2", "--out", "no.png"], "--focus 2 needs distances"),
         (

@@ -36,8 +36,10 @@ pub fn depth_from_mask(mask: &Mask, outline: Outline, color: &ColorImage) -> Dep
     };
     let mut mask = mask.clone();
     if outline.grow_px != 0 {
-        let scale = mask.width as f32 / color.width.max(1) as f32;
-        move_outline(&mut mask, (outline.grow_px as f32 * scale).round() as i32);
+        // A square mask of another picture has other scales across and down.
+        let sides = [(mask.width, color.width), (mask.height, color.height)];
+        let scales = sides.map(|(side, of_picture)| side as f32 / of_picture.max(1) as f32);
+        move_outline(&mut mask, scales.map(|scale| (outline.grow_px as f32 * scale).round() as i32));
     }
     let is_loosened = !outline.is_exact && (mask.width, mask.height) == color.size() && is_sharp(&mask);
     let mut fitted = match is_loosened {
@@ -91,26 +93,28 @@ fn alpha_of(map: &DepthMap) -> Mask {
     Mask { width: map.width, height: map.height, alpha }
 }
 
-/// Dilates the mask by a disc of radius `px`, or erodes it if negative.
-fn move_outline(mask: &mut Mask, px: i32) {
+/// Dilates the mask by an ellipse of `px` across and down, or erodes it if negative.
+fn move_outline(mask: &mut Mask, px: [i32; 2]) {
     let invert = |mask: &mut Mask| mask.alpha.iter_mut().for_each(|alpha| *alpha = 1.0 - *alpha);
-    if px < 0 {
+    let is_inwards = px.iter().any(|&px| px < 0);
+    if is_inwards {
         invert(mask);
     }
-    let (width, radius) = (mask.width as usize, i64::from(px.unsigned_abs()));
+    let (width, [across, radius]) = (mask.width as usize, px.map(|px| i64::from(px.unsigned_abs())));
     let height = mask.height as usize;
     let before = mask.alpha.clone();
     let mut widened = vec![0.0; width];
     for down in -radius..=radius {
-        // The disc's half width in this row; half a pixel more makes it round.
-        let half = ((radius * (radius + 1) - down * down) as f32).sqrt() as usize;
+        // The ellipse's half width in this row; half a pixel more makes it round.
+        let at = (down * across) as f64 / radius.max(1) as f64;
+        let half = ((across * (across + 1)) as f64 - at * at).max(0.0).sqrt() as usize;
         for y in (0..height).filter(|y| (0..height as i64).contains(&(*y as i64 + down))) {
             widen(&before[(y as i64 + down) as usize * width..][..width], half, &mut widened);
             let row = &mut mask.alpha[y * width..][..width];
             row.iter_mut().zip(&widened).for_each(|(alpha, widened)| *alpha = alpha.max(*widened));
         }
     }
-    if px < 0 {
+    if is_inwards {
         invert(mask);
     }
 }
@@ -188,15 +192,30 @@ mod tests {
         for px in [1, 3, 10] {
             let (_, disc_mask) = disc(0);
             let mut moved = disc_mask.clone();
-            move_outline(&mut moved, px);
+            move_outline(&mut moved, [px; 2]);
             let expected = std::f32::consts::PI * (30.0 + px as f32).powi(2);
             assert!((area(&moved) / expected - 1.0).abs() < 0.02, "{px}: {} {expected}", area(&moved));
-            move_outline(&mut moved, -px);
+            move_outline(&mut moved, [-px; 2]);
             assert!((area(&moved) / area(&disc_mask) - 1.0).abs() < 0.01, "{px}");
             // Half planes at the border stay half planes.
             let mut half = mask(40, 9, |x, _| x < 20);
-            move_outline(&mut half, -px);
+            move_outline(&mut half, [-px; 2]);
             assert_eq!(half, mask(40, 9, |x, _| x < 20 - px));
+        }
+    }
+
+    #[test]
+    fn the_outline_of_a_square_mask_moves_by_pixels_of_its_picture() {
+        let color = ColorImage::new(160, 80);
+        let given = mask(80, 80, |x, y| (20..60).contains(&x) && (20..60).contains(&y));
+        for px in [-6, 0, 6] {
+            let outline = Outline { grow_px: px, is_exact: true, ..Outline::default() };
+            let moved = alpha_of(&depth_from_mask(&given, outline, &color));
+            let count = |from: usize, step: usize, count: usize| {
+                (0..count).filter(|at| moved.alpha[from + at * step] > 0.5).count() as i32
+            };
+            // Across the middle row, and down the middle column.
+            assert_eq!((count(40 * 160, 1, 160), count(80, 160, 80)), (80 + 2 * px, 40 + 2 * px), "{px}");
         }
     }
 

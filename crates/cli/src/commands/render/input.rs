@@ -11,10 +11,11 @@ use bokehcam::depth::defocus;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
-use bokehcam::frame::{ColorImage, DepthMap, Mask};
+use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
-use bokehcam::recording::{Photo, snapshot, still};
+use bokehcam::recording::mask_file::{self, MaskFile};
+use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::orientation::transform_photo;
 use bokehcam::source::photo::{self, PhotoDepth};
 use bokehcam::source::{self, DepthChoice, DepthOrigin};
@@ -105,9 +106,8 @@ fn compute_depth(
         }
         (Some(file), _) => {
             source::reject_metric_look(look, "a mask gives")?;
-            let (width, height, share) = still::read_grey(file)?;
-            still::check_mask_size(file, (width, height), own_px)?;
-            let mask = Mask { width, height, alpha: share };
+            let MaskFile { mask, notes } = mask_file::read(file, own_px)?;
+            notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
             let mask = command.orientation.transform().apply_to_mask(&mask, own_px);
             plausible::warn_of_mask(file, &mask, color);
             let outline = Outline {

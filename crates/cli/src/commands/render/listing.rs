@@ -37,7 +37,7 @@ pub(super) fn is_many(images: &[PathBuf], out: &Path) -> bool {
 }
 
 /// Lists the pictures of `images`, each once, with results in the folder `out`, in `format` or that of each picture. Depth
-/// maps and originals of snapshots among them are left out.
+/// maps, masks and originals of snapshots among them are left out.
 ///
 /// # Errors
 /// `out` is no folder, a folder cannot be read, there is no picture, or two would have the same result.
@@ -66,10 +66,13 @@ pub(super) fn list_pictures(
     match count - paths.len() {
         0 => {}
         left if left == count => {
-            let what = "these are depth maps, or pictures that belong to snapshots: name the pictures themselves";
+            let what =
+                "these are depth maps, masks, or pictures that belong to snapshots: name the pictures themselves";
             return Err(CliError::Usage(format!("{}: {what}", images[0].display())));
         }
-        left => log::note(&format!("{left} files left out by their names: depth maps, or pictures of snapshots")),
+        left => {
+            log::note(&format!("{left} files left out by their names: depth maps, masks, or pictures of snapshots"))
+        }
     }
     let result_name = |path: &Path| result_name(path, format);
     let mut owners: HashMap<OsString, &Path> = HashMap::new();

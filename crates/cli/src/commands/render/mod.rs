@@ -71,8 +71,9 @@ pub struct RenderCommand {
     /// many pictures a folder, with NAME.png, NAME.pfm or NAME-depth.* for each picture NAME
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
-    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp. For many pictures a
-    /// folder, with NAME.png or NAME-mask.* for each picture NAME
+    /// A mask of the subject, a picture of any size with the photo's aspect ratio, or a square: white is the subject,
+    /// which stays sharp, or what is opaque in a picture that was cut out. For many pictures a folder, with NAME.png or
+    /// NAME-mask.* for each picture NAME
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
     /// Move the outline of --mask outwards by this much, in pixels of the picture; inwards if negative. Then it is
