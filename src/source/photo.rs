@@ -145,7 +145,13 @@ impl ReadPhoto {
         findings.depth_by = Some(format!("{name} itself ({kind})"));
         (self.depth_from, self.depth) = (depth.distances.into(), Some(depth.map));
         if let Some(original) = original {
-            findings.notes.push(format!("{name}: the original before the phone's own blur is inside, and is used"));
+            let ([width, height], photo) = ([original.width, original.height], self.color.size());
+            let size = match original.size() == photo {
+                true => String::new(),
+                false => format!(": {width}x{height} pixels, where the photo has {}x{}", photo.0, photo.1),
+            };
+            let note = format!("{name}: the original before the phone's own blur is inside, and is used{size}");
+            findings.notes.push(note);
             self.color = Arc::new(original);
             findings.original = Some(Arc::clone(&self.color));
         }

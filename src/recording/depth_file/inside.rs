@@ -64,10 +64,11 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
         meaning::nearest(inverse.collect()).filter(|_| !is_metric).map_or(1.0, |near| near * DepthMap::SUBJECT_M);
     file.map.metres.iter_mut().for_each(|metres| *metres *= scale);
 
-    let original = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation) {
+    let views = [color, file.map.size()];
+    let original = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation, views) {
         Ok(original) => Some(original),
-        Err(fault) => {
-            file.notes.push(format!("the original picture inside ({kind}) is left out: {fault}"));
+        Err(what) => {
+            file.notes.push(format!("the original picture inside ({kind}) is left out: {what}"));
             None
         }
     });
@@ -81,12 +82,24 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
 }
 
 /// Decodes the original, and turns it as its own tag says, or else as the photo's does.
-fn decode_original(bytes: &[u8], orientation: Orientation) -> Result<ColorImage, PictureFault> {
+///
+/// # Errors
+/// Returns, in words, that it is damaged, or has the view of neither the photo nor the map (columns, rows).
+fn decode_original(bytes: &[u8], orientation: Orientation, views: [(u32, u32); 2]) -> Result<ColorImage, String> {
     let mut original = ColorImage::default();
-    let mut metadata: PhotoMetadata =
-        decode::decode_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), &mut original)?;
+    let decode = |into| decode::decode_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), into);
+    let mut metadata: PhotoMetadata = decode(&mut original).map_err(|fault: PictureFault| fault.to_string())?;
     let own = metadata.take_orientation();
-    Ok(upright(if own == Orientation::NoTransforms { orientation } else { own }).transform_color(original))
+    let original = upright(if own == Orientation::NoTransforms { orientation } else { own }).transform_color(original);
+    // Of a photo that an editor has cropped, original and map still belong together.
+    let [size, photo, map] = [original.size(), views[0], views[1]];
+    match views.iter().any(|view| fit::has_same_view(*view, size)) {
+        true => Ok(original),
+        false => Err(format!(
+            "its {}x{} pixels have another aspect ratio than the photo ({}x{}) and its depth ({}x{})",
+            size.0, size.1, photo.0, photo.1, map.0, map.1
+        )),
+    }
 }
 
 /// Returns the point of the upright picture that (`x`, `y`) of the stored one becomes.

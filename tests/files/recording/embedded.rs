@@ -3,8 +3,15 @@
 mod containers;
 mod damage;
 
+use std::fs;
+use std::sync::Arc;
+
+use bokehcam::frame::ColorImage;
+use bokehcam::look::Look;
 use bokehcam::recording::PictureFault;
 use bokehcam::recording::embedded::{EmbeddedDepth, Focus, Meaning, find};
+use bokehcam::source::Options;
+use bokehcam::source::photo::read_default_depth;
 use image::ImageFormat;
 
 use self::containers::*;
@@ -262,6 +269,35 @@ fn a_damaged_original_is_left_out() {
     // A file of both kinds whose better one is broken has the other one.
     let both = with_segments(&gdepth(RANGE, map), &[main_xmp(&packet("", &format!("<Camera:DepthMap {DEPTH_MAP}/>")))]);
     assert_eq!((found(&both).kind, &found(&both).map), ("GDepth", map));
+}
+
+/// An original of another view than photo and map costs the original; one of another size is used, which is said.
+#[test]
+fn an_original_has_the_view_of_the_photo_or_of_the_map() {
+    let directory = tempfile::TempDir::new().unwrap();
+    let path = directory.path().join("photo.jpg");
+    // The map has 8x4 pixels, and the photo 16x8.
+    for (photo, (width, height), note) in [
+        ((16, 8), (16, 8), "inside, and is used"),
+        ((16, 8), (32, 16), "inside, and is used: 32x16 pixels, where the photo has 16x8"),
+        ((16, 16), (32, 16), "inside, and is used: 32x16 pixels, where the photo has 16x16"),
+        (
+            (16, 8),
+            (24, 24),
+            "the original picture inside (GDepth) is left out: its 24x24 pixels have another aspect ratio than the \
+             photo (16x8) and its depth (8x4)",
+        ),
+    ] {
+        let original = encode(image::GrayImage::from_pixel(width, height, [200].into()), ImageFormat::Png);
+        fs::write(&path, gdepth_extended(RANGE, &maps()[1], &original, |_| {})).unwrap();
+        let color = Arc::new(ColorImage::new(photo.0, photo.1));
+        let (depth, notes) = read_default_depth(&path, &color, &Options::default(), &Look::default()).unwrap();
+        assert!(notes.iter().any(|said| said.ends_with(note)), "{note:?} is not in {notes:?}");
+        let depth = depth.unwrap();
+        let size = depth.original.map(|original| original.size());
+        assert_eq!(size, (width != height).then_some((width, height)), "{notes:?}");
+        assert_eq!(depth.map.size(), (8, 4));
+    }
 }
 
 /// The seeds for fuzzing come from another writer: Pillow, and a script after the formats' documents.
