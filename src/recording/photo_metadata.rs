@@ -70,9 +70,11 @@ impl PhotoMetadata {
 
     /// Keeps the parts of a packet that are still valid.
     fn set_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
-        self.lost_properties.extend(packet.iter().flat_map(|packet| xmp::find_lost_properties(packet)));
         match packet.and_then(xmp::keep_valid_parts) {
-            Ok(packet) => self.xmp = Some(packet),
+            Ok(xmp::ValidParts { packet, lost }) => {
+                self.xmp = Some(packet);
+                self.lost_properties.extend(lost);
+            }
             Err(lost) => self.lost_properties.push(lost),
         }
     }

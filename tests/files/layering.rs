@@ -61,7 +61,7 @@ const DOORS: [(&str, &[&str]); 37] = [
         ],
     ),
     ("rfd", &["window/dialog"]),
-    ("roxmltree", &["calibration/xml", "recording/embedded"]),
+    ("roxmltree", &["calibration/xml", "recording/embedded", "recording/xmp"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
     ("ruzstd", &["recording/mcap"]),

@@ -1,7 +1,8 @@
 //! Properties in XMP: attributes or elements of the RDF, found by namespace and name wherever they are.
 
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 
+use super::super::xmp;
 use super::packets::Packets;
 
 /// The namespace of `GDepth`.
@@ -10,9 +11,6 @@ pub(super) const GDEPTH: &str = "http://ns.google.com/photos/1.0/depthmap/";
 pub(super) const DYNAMIC_DEPTH: &str = "http://ns.google.com/photos/dd/1.0/depthmap/";
 /// The namespace of Apple's auxiliary pictures.
 pub(super) const APPLE: &str = "http://ns.apple.com/pixeldatainfo/1.0/";
-
-/// Maximum number of tags and quotes in a packet: memory for parsing grows with them, and time even with their square.
-const MAX_MARKS: usize = 10_000;
 
 /// The parsed packets of a file.
 pub(super) struct Xmp<'a> {
@@ -23,18 +21,18 @@ pub(super) struct Xmp<'a> {
 impl<'a> Xmp<'a> {
     /// Parses the packets. Damaged ones are left out.
     pub(super) fn parse(packets: &'a Packets) -> Self {
-        let mut xmp = Self { documents: Vec::new(), damage: None };
+        let mut parsed = Self { documents: Vec::new(), damage: None };
         for packet in &packets.packets {
-            match parse_document(packet) {
-                Some(document) => xmp.documents.push(document),
-                None if mentions_depth(packet) => xmp.damage = Some("it is damaged XML"),
+            match xmp::parse(packet) {
+                Some(document) => parsed.documents.push(document),
+                None if mentions_depth(packet) => parsed.damage = Some("it is damaged XML"),
                 None => {}
             }
         }
         if packets.is_incomplete && packets.packets.iter().any(|packet| mentions_depth(packet)) {
-            xmp.damage = Some("pieces of its Extended XMP are missing");
+            parsed.damage = Some("pieces of its Extended XMP are missing");
         }
-        xmp
+        parsed
     }
 
     /// Returns, in words, the damage to packets that mention depth.
@@ -67,16 +65,6 @@ pub(super) fn value<'a>(node: Node<'a, '_>, namespace: &str, name: &str) -> Opti
 /// Parses a finite number.
 pub(super) fn parse_number(text: &str) -> Option<f32> {
     text.trim().parse().ok().filter(|number: &f32| number.is_finite())
-}
-
-fn parse_document(packet: &[u8]) -> Option<Document<'_>> {
-    let is_mark = |byte: &&u8| matches!(byte, b'<' | b'"' | b'\'');
-    if packet.iter().filter(is_mark).take(MAX_MARKS + 1).count() > MAX_MARKS {
-        return None;
-    }
-    let text = std::str::from_utf8(packet).ok()?.trim_matches(['\0', '\u{feff}', ' ', '\t', '\r', '\n']);
-    // Without DTD, there are no entities to expand.
-    Document::parse_with_options(text, ParsingOptions { allow_dtd: false, ..ParsingOptions::default() }).ok()
 }
 
 fn mentions_depth(packet: &[u8]) -> bool {
