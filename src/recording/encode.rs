@@ -8,7 +8,7 @@ use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{self, DISPARITY_SCALE, MapUnit};
-use super::{jpeg, jpeg_intervals, xmp};
+use super::{image_resources, jpeg, jpeg_intervals, xmp};
 use crate::color::round_to_8bit;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
@@ -104,7 +104,7 @@ pub(super) fn encode_photo_png(
     writer.finish()
 }
 
-/// Appends a picture to `file`, which must be empty, as JPEG, with its colour profile, EXIF and XMP. It has no alpha.
+/// Appends a picture to `file`, which must be empty, as JPEG, with its colour profile, EXIF, XMP and IPTC. It has no alpha.
 pub(super) fn encode_photo_jpeg(raster: &Raster, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> ImageResult<()> {
     let set_metadata = |encoder: &mut JpegEncoder<&mut Vec<u8>>| {
         if let Some(profile) = &metadata.icc_profile {
@@ -117,6 +117,10 @@ pub(super) fn encode_photo_jpeg(raster: &Raster, metadata: &PhotoMetadata, file:
     };
     let (rgb, _) = raster.to_8bit();
     jpeg_intervals::encode(&rgb, raster.size, JPEG_QUALITY, set_metadata, file)?;
+    // Each goes before those inserted earlier.
+    for part in metadata.image_resources.iter().flat_map(|all| all.rchunks(image_resources::MAX_SEGMENT_BYTES)) {
+        jpeg::insert_application_segment(file, 13, &[image_resources::JPEG_NAME, part].concat());
+    }
     if let Some(packet) = &metadata.xmp {
         jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }

@@ -29,6 +29,7 @@ mod folder;
 mod frame_sequence;
 mod heif;
 mod icc;
+mod image_resources;
 mod jpeg;
 mod jpeg_intervals;
 mod kinect;

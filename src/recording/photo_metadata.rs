@@ -4,7 +4,7 @@ use image::ImageDecoder;
 use image::metadata::Orientation;
 
 use super::still::PhotoFormat;
-use super::{icc, xmp};
+use super::{icc, image_resources, xmp};
 
 /// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub struct PhotoMetadata {
     pub exif: Option<Vec<u8>>,
     /// XMP packet, with rights and authors.
     pub xmp: Option<String>,
+    /// Photoshop's image resources without thumbnails, with captions and rights as IPTC.
+    pub image_resources: Option<Vec<u8>>,
     /// What is lost on reading or writing, in words for a message.
     pub lost_properties: Vec<&'static str>,
 }
@@ -54,6 +56,12 @@ impl PhotoMetadata {
         metadata.set_profile(decoder.icc_profile().ok().flatten());
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
             metadata.set_xmp(Ok(packet));
+        }
+        if let Some(resources) = decoder.iptc_metadata().ok().flatten() {
+            match image_resources::keep_valid_parts(&resources) {
+                Some(kept) => metadata.image_resources = Some(kept).filter(|kept| !kept.is_empty()),
+                None => metadata.lost_properties.push("captions (IPTC) that are damaged"),
+            }
         }
         metadata
     }
@@ -100,11 +108,17 @@ impl PhotoMetadata {
 
     /// Drops metadata that a format does not hold.
     #[must_use]
-    pub fn for_format(self, format: PhotoFormat) -> Self {
+    pub fn for_format(mut self, format: PhotoFormat) -> Self {
         match format {
-            PhotoFormat::Jpeg => self.for_jpeg(),
-            PhotoFormat::Png | PhotoFormat::Tiff | PhotoFormat::WebP => self,
+            PhotoFormat::Jpeg => return self.for_jpeg(),
+            PhotoFormat::Tiff => {}
+            PhotoFormat::Png | PhotoFormat::WebP => {
+                let resources = self.image_resources.take();
+                let has_iptc = resources.as_deref().is_some_and(image_resources::have_iptc);
+                self.lost_properties.extend(has_iptc.then_some("captions and rights as IPTC"));
+            }
         }
+        self
     }
 
     /// Drops metadata that is too large for a JPEG.

@@ -11,12 +11,15 @@ use tiff::encoder::{Compression, DeflateLevel, DirectoryEncoder, TiffEncoder, Ti
 use tiff::tags::{ByteOrder, ExtraSamples, IfdPointer, Predictor, Tag, Type, ValueBuffer};
 use tiff::{Directory, TiffResult};
 
-use super::PhotoMetadata;
 use super::encode::{Raster, Samples};
 use super::tiff_directory::TiffDirectories;
+use super::{PhotoMetadata, image_resources};
 
 /// XMP packet (XMP specification, part 3).
 const XMP: Tag = Tag::Unknown(700);
+/// Captions and rights as IPTC, alone and among Photoshop's image resources.
+const IPTC: Tag = Tag::Unknown(33723);
+const IMAGE_RESOURCES: Tag = Tag::Unknown(34377);
 /// What a TIFF's own directory says about the photo: orientation, titles, names of camera and programs, time, author,
 /// rights, and Windows' texts. Its other entries describe the pixels.
 const DESCRIPTIVE: [u16; 15] = [269, 270, 271, 272, 274, 305, 306, 315, 316, 33432, 40091, 40092, 40093, 40094, 40095];
@@ -164,6 +167,7 @@ pub(super) struct Undecoded {
     exif: Option<Vec<u8>>,
     /// The colour profile, whatever the type of its entry.
     profile: Option<Vec<u8>>,
+    image_resources: Option<Vec<u8>>,
     /// Whether colours are multiplied by alpha ("associated").
     is_premultiplied: bool,
 }
@@ -173,10 +177,17 @@ impl Undecoded {
     pub(super) fn read(file: &mut File) -> Self {
         let Ok(mut decoder) = Decoder::new(BufReader::new(file)) else { return Self::default() };
         let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten();
-        let mut profile = ValueBuffer::empty(Type::UNDEFINED);
-        let has_profile = matches!(decoder.image_ifd().find_tag_buf(Tag::IccProfile, &mut profile), Ok(Some(_)));
+        let mut bytes_of = |tag| {
+            let mut bytes = ValueBuffer::empty(Type::UNDEFINED);
+            let is_there = matches!(decoder.image_ifd().find_tag_buf(tag, &mut bytes), Ok(Some(_)));
+            is_there.then(|| bytes.as_bytes().to_vec())
+        };
+        let profile = bytes_of(Tag::IccProfile);
+        let iptc = |bytes: Vec<u8>| image_resources::from_iptc(&bytes);
+        let image_resources = bytes_of(IMAGE_RESOURCES).or_else(|| bytes_of(IPTC).map(iptc));
         Self {
-            profile: has_profile.then(|| profile.as_bytes().to_vec()),
+            profile,
+            image_resources,
             exif: Exif::read(&mut decoder).and_then(|exif| exif.encode()).ok().flatten(),
             is_premultiplied: extra.is_some_and(|extra| extra.first() == Some(&ExtraSamples::AssociatedAlpha.to_u16())),
         }
@@ -204,6 +215,9 @@ impl<D: ImageDecoder> ImageDecoder for TiffPhotoDecoder<D> {
     }
     fn xmp_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
         self.decoder.xmp_metadata()
+    }
+    fn iptc_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.undecoded.image_resources.clone())
     }
     fn read_image(self, into: &mut [u8]) -> ImageResult<()> {
         let color = self.decoder.color_type();
@@ -237,7 +251,7 @@ fn divide_by_alpha(color: u64, alpha: u64, white: u64) -> u64 {
     (color * white + alpha / 2).checked_div(alpha).map_or(color, |divided| divided.min(white))
 }
 
-/// Appends a picture to `file`, which must be empty, as compressed TIFF, with its colour profile, EXIF and XMP.
+/// Appends a picture to `file`, which must be empty, as compressed TIFF, with its colour profile, EXIF, XMP and IPTC.
 pub(super) fn encode_photo(raster: &Raster, metadata: &PhotoMetadata, file: &mut Vec<u8>) -> TiffResult<()> {
     let compression = Compression::Deflate(DeflateLevel::Fast);
     let encoder = TiffEncoder::new(Cursor::new(file))?.with_compression(compression);
@@ -272,6 +286,9 @@ where
     }
     if let Some(packet) = &metadata.xmp {
         own.write_tag(XMP, packet.as_bytes())?;
+    }
+    if let Some(resources) = &metadata.image_resources {
+        write_entries(own, &[(IMAGE_RESOURCES, Type::BYTE, resources.clone())])?;
     }
     image.write_data(samples)
 }
