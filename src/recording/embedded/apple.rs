@@ -3,6 +3,8 @@
 //!
 //! Format: the keys of Image I/O's auxiliary data (`kCGImageAuxiliaryDataTypeDisparity`), as iPhones write them.
 
+use roxmltree::Node;
+
 use super::packets::Packets;
 use super::xmp::{APPLE, Xmp};
 use super::{EmbeddedDepth, Found, Meaning, is_complete, multi_picture};
@@ -10,6 +12,8 @@ use crate::frame::DepthMap;
 
 pub(super) const KIND: &str = "Apple";
 
+/// The namespace of gain maps, which brighten a photo on screens of high dynamic range.
+const GAIN_MAP: &str = "http://ns.adobe.com/hdr-gain-map/1.0/";
 const DEPTH_DATA: &str = "http://ns.apple.com/depthData/1.0/";
 
 /// Finds the first auxiliary picture of depth or disparity: the file itself, or one that its index lists.
@@ -17,9 +21,25 @@ pub(super) fn find(file: &[u8], xmp: &Xmp) -> Found {
     if let Some(found) = read_picture(file, xmp)? {
         return Ok(Some(found));
     }
-    multi_picture::pictures(file)
-        .find_map(|picture| read_picture(picture, &Xmp::parse(&Packets::read(picture))).transpose())
-        .transpose()
+    let mut has_lost_map = false;
+    for listed in multi_picture::pictures(file) {
+        has_lost_map |= listed.is_lost_map();
+        let Some(picture) = listed.picture else { continue };
+        if let Some(found) = read_picture(picture, &Xmp::parse(&Packets::read(picture)))? {
+            return Ok(Some(found));
+        }
+    }
+    // The lost picture of an HDR photo is its gain map.
+    match has_lost_map && !xmp.nodes().any(has_gain_map) {
+        true => Err("a picture that the file lists after the photo is cut off or missing".into()),
+        false => Ok(None),
+    }
+}
+
+/// Returns whether an element says that the photo has a gain map.
+fn has_gain_map(node: Node) -> bool {
+    node.attributes().any(|attribute| attribute.namespace() == Some(GAIN_MAP))
+        || node.tag_name().namespace() == Some(GAIN_MAP)
 }
 
 /// Reads a picture as depth; `None` if it is another one.

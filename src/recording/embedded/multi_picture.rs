@@ -2,6 +2,7 @@
 
 use super::super::jpeg;
 use super::super::tiff_directory::TiffDirectories;
+use super::is_picture;
 
 /// The marker APP2.
 const APP2: u8 = 0xE2;
@@ -10,29 +11,58 @@ const NAME: &[u8] = b"MPF\0";
 /// The tag of the list of pictures: 16 bytes each, with size and position at bytes 4 and 8.
 const ENTRIES_TAG: u16 = 0xB002;
 const ENTRY_BYTES: usize = 16;
+/// The bits of an entry's first word that say what its picture is; 0 is undefined, as phones write for depth and others.
+const KIND_BITS: usize = 0xFF_FFFF;
 /// Maximum number of pictures that are looked at; phones write about ten.
 const MAX_PICTURES: usize = 16;
 
-/// Returns the pictures of a JPEG after the first one. Those outside the file are left out: programs that keep only the
-/// first picture often leave the index.
-pub(super) fn pictures(file: &[u8]) -> impl Iterator<Item = &[u8]> {
+/// A picture that an index lists.
+pub(super) struct Listed<'a> {
+    /// Its bytes; `None` if no picture is there: programs that keep only the first one often leave the index.
+    pub picture: Option<&'a [u8]>,
+    /// Whether it has a kind of its own: a thumbnail, or another view. Those are whole pictures, and no maps.
+    has_kind: bool,
+}
+
+impl Listed<'_> {
+    /// Returns whether it may be depth, and is missing.
+    pub(super) fn is_lost_map(&self) -> bool {
+        self.picture.is_none() && !self.has_kind
+    }
+}
+
+/// Returns the pictures of a JPEG after the first one.
+pub(super) fn pictures(file: &[u8]) -> impl Iterator<Item = Listed<'_>> {
     let index = jpeg::segments(file).find_map(|(marker, start, content)| {
         let index = content.strip_prefix(NAME).filter(|_| marker == APP2)?;
         read_entries(index).map(|entries| (entries, start + NAME.len()))
     });
     let (entries, origin) = index.unwrap_or_default();
-    entries.into_iter().filter_map(move |(offset, size)| {
-        // Positions count from the byte after the identifier; 0 is the first picture.
-        let start = origin.checked_add(offset).filter(|_| offset > 0)?;
-        file.get(start..start.checked_add(size)?)
+    // Position 0 is the first picture.
+    entries.into_iter().filter(|entry| entry.offset > 0 && entry.size > 0).map(move |Entry { kind, offset, size }| {
+        // Positions count from the byte after the identifier.
+        let start = origin.saturating_add(offset);
+        let picture = file.get(start..start.saturating_add(size)).filter(|picture| is_picture(picture));
+        Listed { picture, has_kind: kind != 0 }
     })
 }
 
-/// Reads position and size of each picture from an index, which has the form of a TIFF directory.
-fn read_entries(index: &[u8]) -> Option<Vec<(usize, usize)>> {
+/// An entry of an index.
+struct Entry {
+    kind: usize,
+    offset: usize,
+    size: usize,
+}
+
+/// Reads the entries of an index, which has the form of a TIFF directory.
+fn read_entries(index: &[u8]) -> Option<Vec<Entry>> {
     let index = TiffDirectories::parse(index)?;
     let list = index.find_tag(ENTRIES_TAG)?;
     let (bytes, start) = (index.u32_at(list + 4)?, index.u32_at(list + 8)?);
     let entries = (0..(bytes / ENTRY_BYTES).min(MAX_PICTURES)).map(|entry| start + ENTRY_BYTES * entry);
-    Some(entries.map_while(|at| Some((index.u32_at(at + 8)?, index.u32_at(at + 4)?))).collect())
+    let read = |at| {
+        let [attributes, size, offset] = [at, at + 4, at + 8].map(|at| index.u32_at(at));
+        Some(Entry { kind: attributes? & KIND_BITS, offset: offset?, size: size? })
+    };
+    Some(entries.map_while(read).collect())
 }

@@ -208,14 +208,27 @@ fn what_has_no_depth_is_no_fault() {
     let rights = with_segments(&jpeg(9), &[main_xmp(&packet("", "<dc:rights xmlns:dc=\"d\">me</dc:rights>"))]);
     let broken_rights = with_segments(&jpeg(9), &[main_xmp("<x:xmpmeta><not closed")]);
     let png = encode(image::GrayImage::new(2, 2), ImageFormat::Png);
-    // An index whose pictures a program has dropped.
-    let mut index_only = multi_picture(true, &[auxiliary(3, DISPARITY)]);
-    index_only.truncate(index_only.len() - auxiliary(3, DISPARITY).len());
-    for file in
-        [&rights, &broken_rights, &png, &index_only, &jpeg(9), &b"GIF89a".to_vec(), &vec![], &vec![0xFF, 0xD8, 0xFF]]
-    {
+    for file in [&rights, &broken_rights, &png, &jpeg(9), &b"GIF89a".to_vec(), &vec![], &vec![0xFF, 0xD8, 0xFF]] {
         assert_eq!(find(file).unwrap(), None);
     }
+    // An index whose pictures a program has dropped: previews of cameras, and the gain map of a phone.
+    let index_only = |kind: u32| {
+        let picture = auxiliary(3, DISPARITY);
+        let mut file = multi_picture(true, std::slice::from_ref(&picture));
+        file.truncate(file.len() - picture.len());
+        let size = (picture.len() as u32).to_be_bytes();
+        let entry = [&[0; 4], &size[..]].concat();
+        let at = file.windows(8).position(|bytes| bytes == entry).unwrap();
+        file[at..at + 4].copy_from_slice(&kind.to_be_bytes());
+        file
+    };
+    let namespace = "xmlns:hdrgm=\"http://ns.adobe.com/hdr-gain-map/1.0/\"";
+    let gain_map = main_xmp(&packet(&format!("{namespace} hdrgm:Version=\"1.0\""), ""));
+    let with_gain_map = with_segments(&index_only(0), &[gain_map]);
+    for file in [index_only(0x1_0001), index_only(0x1_0002), index_only(0x8002_0003), with_gain_map] {
+        assert_eq!(find(&file).unwrap(), None);
+    }
+    assert_refused(&index_only(0), &["Apple", "cut off or missing"]);
 }
 
 #[test]
@@ -247,6 +260,14 @@ fn a_claim_that_does_not_hold_is_told() {
     assert_refused(&dynamic(&DEPTH_MAP.replace("Meters", "Diopters")), &["dioptres"]);
     assert_refused(&dynamic(&DEPTH_MAP.replace("DepthMap:Far=\"8\"", "")), &["Near and Far are not stated"]);
 
+    // An auxiliary picture that is cut off or elsewhere, and only one of two.
+    let (matte, map) = (auxiliary(2, MATTE), auxiliary(3, DISPARITY));
+    let cut = multi_picture(true, &[matte.clone(), map.clone()]);
+    let moved = multi_picture(true, std::slice::from_ref(&map));
+    let end = moved.len() - map.len();
+    for file in [&cut[..cut.len() - 1], &[&moved[..end], b"ten bytes.", &map].concat()] {
+        assert_refused(file, &["Apple", "a picture that the file lists after the photo is cut off or missing"]);
+    }
     for (from, to, part) in [
         ("FloatMaxValue>2.5", "FloatMaxValue>many", "FloatMaxValue) is not stated"),
         ("0.5", "3", "its range is 3 to 2.5"),
