@@ -9,6 +9,15 @@ use super::error::CliError;
 use super::log;
 use bokehcam::files::input::find_special_file_kind;
 use bokehcam::files::{atomic_file, place};
+use bokehcam::recording::still::{self, PhotoFormat};
+
+/// Returns the picture format for the name of a result, the value of the option `what`.
+///
+/// # Errors
+/// [`CliError::Usage`] if the extension is that of no format.
+pub fn check_picture_name(what: &str, path: &Path) -> Result<PhotoFormat, CliError> {
+    still::photo_format(path).map_err(|error| CliError::Usage(format!("{what} {error}")))
+}
 
 /// Refuses to replace files without `--force`.
 ///

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use crate::error::CliError;
-use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
+use crate::files::{
+    check_picture_name, create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers,
+};
 use crate::log;
 use crate::options;
 use crate::settings::layers::GivenSettings;
@@ -54,7 +56,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &GivenSettin
     for folder in name.input_paths() {
         refuse_overwriting_source("--to", to, &folder)?;
     }
-    still::photo_format(to)?;
+    check_picture_name("--to", to)?;
     let options = Options { frames: frames.clone(), depth_choice: DepthChoice::None, ..Options::default() };
     let Source { camera, depth_from, .. } = Source::open(name, &options, None)?;
     unused::warn_of_unused(

@@ -16,7 +16,9 @@ use clap::{Args, value_parser};
 use input::{FoundDepth, Input, read_input};
 
 use crate::error::CliError;
-use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
+use crate::files::{
+    check_picture_name, create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers,
+};
 use crate::focus;
 use crate::log;
 use crate::options;
@@ -37,7 +39,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
 use bokehcam::names;
 use bokehcam::recording::snapshot;
-use bokehcam::recording::still::{self, PhotoFormat};
+use bokehcam::recording::still::PhotoFormat;
 use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
@@ -143,6 +145,7 @@ pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSe
 
 /// Refuses outputs that exist, without `--force`, or that are inputs.
 fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
+    check_picture_name("--out", &command.out)?;
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
     for source in &input_files(command) {
@@ -185,7 +188,7 @@ fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
 
 /// Refuses a result that keeps no transparency, if the look's background is transparent.
 fn check_transparency(command: &RenderCommand, look: &Look) -> Result<(), CliError> {
-    if look.background == Background::Transparent && still::photo_format(&command.out)? == PhotoFormat::Jpeg {
+    if look.background == Background::Transparent && check_picture_name("--out", &command.out)? == PhotoFormat::Jpeg {
         let out = command.out.display();
         return Err(CliError::Usage(format!(
             "--behind transparent: {out}: JPEG keeps no transparency; use .png, .tif or .webp"
