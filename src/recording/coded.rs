@@ -21,6 +21,7 @@ use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
 use super::tiff_directory::is_raw_tiff;
 use super::tiff_file::{TiffPhotoDecoder, Undecoded};
+use super::tiff_form::{SAVE_PHOTO, TiffForm};
 use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::files::input;
 
@@ -274,9 +275,14 @@ fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDe
     if is_raw_tiff(&mut file)? {
         return Err(FileKind::fault(Some(file_kind::RAW), PICTURES));
     }
+    let form = TiffForm::read(&mut file)?;
+    form.check_compression(SAVE_PHOTO)?;
     let undecoded = Undecoded::read(&mut file);
     file.rewind()?;
-    let decoder = decode_with(BufReader::new(file), format)?;
+    let decoder = decode_with(BufReader::new(file), format).map_err(|fault| match fault {
+        PictureFault::Unsupported(_) => form.samples_fault(SAVE_PHOTO),
+        fault => fault,
+    })?;
     Ok(Box::new(TiffPhotoDecoder { decoder, undecoded }))
 }
 

@@ -117,6 +117,14 @@ pub enum PictureFault {
     /// A form of a known kind that is not read.
     #[error("it has a form that is not read ({0}); convert it to PNG")]
     Unsupported(String),
+    /// A form of TIFF that is not read.
+    #[error("it is a TIFF with {form}, which is not read; {remedy}")]
+    TiffForm {
+        /// Its compression or samples, in words.
+        form: String,
+        /// How to save it.
+        remedy: &'static str,
+    },
     /// The header states more pixels than are supported.
     #[error(
         "its header claims {width}x{height} pixels, and at most {MAX_SIDE_PX} a side and {} megapixels are read; scale it \

@@ -50,6 +50,7 @@ mod rgbd;
 mod samples;
 mod tiff_directory;
 mod tiff_file;
+mod tiff_form;
 mod timeline;
 mod unit;
 mod upright;

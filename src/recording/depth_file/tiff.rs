@@ -1,7 +1,7 @@
 //! TIFF with one channel (or three equal ones) of 8 or 16 bits, or floats.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, ErrorKind};
 
 use image::metadata::Orientation;
 use tiff::TiffError;
@@ -10,13 +10,21 @@ use tiff::tags::Tag;
 
 use super::values::{ColorCount, Samples, Values};
 use crate::recording::coded::check_size;
-use crate::recording::fault::PictureFault;
+use crate::recording::fault::{PictureFault, damaged_fault};
+use crate::recording::tiff_form::{SAVE_MAP, TiffForm};
 
 /// Memory for the decoder besides the pixels: one strip or tile, and the lists of them.
 const MAX_BUFFER_BYTES: usize = 64 << 20;
 
 /// Reads the first picture of a file, upright by its orientation tag.
-pub(super) fn read(file: File) -> Result<Values, PictureFault> {
+pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
+    let form = TiffForm::read(&mut file)?;
+    form.check_compression(SAVE_MAP)?;
+    let fault = |error| match error {
+        TiffError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        TiffError::UnsupportedError(_) => form.samples_fault(SAVE_MAP),
+        other => damaged_fault(&other),
+    };
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(fault)?;
     let (width, height) = decoder.dimensions().map_err(fault)?;
     check_size(width, height)?;
@@ -45,7 +53,7 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
                 .collect(),
         };
         if numbers.len() != pixels {
-            return Err(PictureFault::Truncated);
+            return Err(if form.is_packed() { form.samples_fault(SAVE_MAP) } else { PictureFault::Truncated });
         }
         colors.check(pixels)?;
         Ok(Values { size: (width, height), numbers, samples, ..Values::default() }.turned(orientation))
@@ -62,12 +70,5 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
         DecodingResult::F32(stored) => floats(stored),
         DecodingResult::F64(stored) => floats(stored.into_iter().map(|number| number as f32).collect()),
         _ => Err(PictureFault::NotAMap("a TIFF of this number format".to_owned())),
-    }
-}
-
-fn fault(error: TiffError) -> PictureFault {
-    match error {
-        TiffError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => PictureFault::Damaged(other.to_string().replace('\n', " ")),
     }
 }

@@ -101,9 +101,37 @@ fn floats_are_not_a_colour_picture() {
     ] {
         assert_says(
             read_color(&save(&dir, image, ImageFormat::Tiff)),
-            &["floating-point samples", "convert it to PNG"],
+            &["32-bit floats, which is not read; save it as RGB of 8 or 16 bits"],
         );
     }
+}
+
+/// A photo and a map each say in plain words what of a TIFF is not read, and how to save it.
+#[test]
+fn the_form_of_a_tiff_that_is_not_read_is_named() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("a.tif");
+    for (entries, form, is_map) in [
+        (&[(259, 50000)][..], "ZSTD compression (code 50000)", true),
+        (&[(259, 50001)], "WebP compression (code 50001)", true),
+        (&[(259, 34887)], "LERC compression (code 34887)", true),
+        (&[(259, 7777)], "unknown compression (code 7777)", true),
+        (&[(262, 3)], "a palette", true),
+        (&[(262, 6), (277, 3)], "colours as YCbCr", false),
+        (&[(277, 2)], "2 channels of 8-bit numbers", false),
+        (&[(258, 32), (339, 3)], "1 channel of 32-bit floats", false),
+    ] {
+        fs::write(&path, tiff(entries)).unwrap();
+        let said = format!("a.tif: it is a TIFF with {form}, which is not read; ");
+        assert_says(read_color(&path), &[&said, "save it as RGB of 8 or 16 bits, with LZW compression or none"]);
+        if is_map {
+            assert_says(read_depth(&path, 1.0, None), &[&said, "save it as grey of 16 bits or floats"]);
+        }
+    }
+    // One bit is black and white, and no map.
+    fs::write(&path, tiff(&[(258, 1)])).unwrap();
+    assert_eq!(read_color(&path).unwrap().size(), (2, 1));
+    assert_says(read_depth(&path, 1.0, None), &["a TIFF with 1 channel of 1-bit numbers, which is not read"]);
 }
 
 /// Cut and changed anywhere: a picture or one line, of the size that its header states.
