@@ -26,7 +26,7 @@ use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::files::input;
 
 /// What a message names where no picture is found.
-const PICTURES: &str = "PNG or JPEG";
+const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
 
 /// Far more than a photograph of [`MAX_PIXELS`] needs.
 const MAX_JPEG_BYTES: u64 = 192 << 20;
@@ -88,7 +88,7 @@ impl<'a> EncodedPicture<'a> {
                 Ok(Self::Whole(decode_with(Cursor::new(bytes), ImageFormat::Jpeg)?))
             }
             Some(FileKind::Jpeg) => Err(PictureFault::Truncated),
-            kind => Err(FileKind::fault(kind, PICTURES)),
+            kind => Err(FileKind::fault(kind, "PNG or JPEG")),
         }
     }
 

@@ -37,9 +37,22 @@ const EXR: FileKind =
 const NUMPY: FileKind = FileKind::Foreign("a NumPy array", "save it as a PNG, or give it as a depth map");
 const PSD: FileKind =
     FileKind::Foreign("a Photoshop picture", "convert it: convert IN.psd[0] OUT.png (package imagemagick)");
+const JPEG_2000: FileKind = FileKind::Foreign(
+    "a JPEG 2000 picture",
+    "convert it: opj_decompress -i IN.jp2 -o OUT.png (package libopenjp2-tools)",
+);
+const PDF: FileKind =
+    FileKind::Foreign("a PDF document", "convert a page: pdftoppm -png -singlefile IN.pdf OUT (package poppler-utils)");
+const SVG: FileKind =
+    FileKind::Foreign("an SVG drawing", "convert it: rsvg-convert IN.svg -o OUT.png (package librsvg2-bin)");
+const XML: FileKind = FileKind::Foreign(
+    "an XML file",
+    "if it is an SVG drawing, convert it: rsvg-convert IN.svg -o OUT.png (package librsvg2-bin)",
+);
+const PNM: FileKind = FileKind::Foreign("a PNM picture", "convert it: convert IN.ppm OUT.png (package imagemagick)");
 
 /// Marks of files, the more specific ones first.
-const MARKS: [Mark; 26] = [
+const MARKS: [Mark; 31] = [
     (FileKind::Png, 0, b"\x89PNG\r\n\x1a\n"),
     (FileKind::Jpeg, 0, b"\xFF\xD8\xFF"),
     (FileKind::Other(ImageFormat::WebP), 0, b"RIFF????WEBP"),
@@ -58,6 +71,11 @@ const MARKS: [Mark; 26] = [
     (EXR, 0, b"\x76\x2F\x31\x01"),
     (NUMPY, 0, b"\x93NUMPY"),
     (PSD, 0, b"8BPS"),
+    (JPEG_2000, 0, b"\0\0\0\x0CjP  \r\n"),
+    (JPEG_2000, 0, b"\xFF\x4F\xFF\x51"),
+    (PDF, 0, b"%PDF-"),
+    (SVG, 0, b"<svg"),
+    (XML, 0, b"<?xml"),
     // Canon, Olympus, Panasonic, Fujifilm, Sigma.
     (RAW, 0, b"II*\0????CR"),
     (RAW, 0, b"IIRO"),
@@ -77,8 +95,11 @@ impl FileKind {
             let bytes = start.get(at..at + mark.len());
             bytes.is_some_and(|bytes| bytes.iter().zip(mark).all(|(byte, mark)| *mark == b'?' || byte == mark))
         };
-        let is_pfm = matches!(start, [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace());
-        if is_pfm { Some(Self::Pfm) } else { MARKS.iter().find(has).map(|(kind, ..)| *kind) }
+        match start {
+            [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => Some(Self::Pfm),
+            [b'P', b'1'..=b'7', space, ..] if space.is_ascii_whitespace() => Some(PNM),
+            _ => MARKS.iter().find(has).map(|(kind, ..)| *kind),
+        }
     }
 
     /// Returns the fault of a file of this kind where another one is `expected`.
@@ -102,9 +123,12 @@ mod tests {
             assert!(start.len() <= START_BYTES);
             assert_ne!(FileKind::detect(&start[..start.len() - 1]), Some(kind), "{start:?}, cut short");
         }
-        for unknown in [&b""[..], b"BM of two letters", b"RIFF\0\0\0\0WAVE", b"\0\0\0\x18ftypmp42", b"<svg>", b"P6 1 1"]
+        for unknown in [&b""[..], b"BM of two letters", b"RIFF\0\0\0\0WAVE", b"\0\0\0\x18ftypmp42", b"P8 1 1", b"P2: 7"]
         {
             assert_eq!(FileKind::detect(unknown), None);
+        }
+        for (start, kind) in [(&b"P1\n8"[..], PNM), (b"P6 1 1", PNM), (b"P7\r\n", PNM), (b"Pf\n8", FileKind::Pfm)] {
+            assert_eq!(FileKind::detect(start), Some(kind));
         }
     }
 }

@@ -178,11 +178,16 @@ fn foreign_kinds_are_named_with_a_command() {
         (b"\0\0\0\x0cJXL \r\n\x87\n", ["a JPEG XL picture", "djxl IN.jxl OUT.png (package libjxl-tools)"]),
         (b"\x76\x2f\x31\x01\x02\0\0\0", ["an OpenEXR picture", "convert IN.exr OUT.png"]),
         (b"\x93NUMPY\x01\0", ["a NumPy array", "depth map"]),
+        (b"\0\0\0\x0cjP  \r\n\x87\n", ["a JPEG 2000 picture", "opj_decompress -i IN.jp2 -o OUT.png"]),
+        (b"%PDF-1.7", ["a PDF document", "pdftoppm -png -singlefile IN.pdf OUT"]),
+        (b"<svg/>", ["an SVG drawing", "rsvg-convert IN.svg -o OUT.png"]),
+        (b"<?xml version='1.0'?><svg/>", ["an XML file", "rsvg-convert IN.svg -o OUT.png"]),
+        (b"P5\n2 1\n255\n..", ["a PNM picture", "convert IN.ppm OUT.png"]),
         (b"FUJIFILMCCD-RAW 0201", ["a camera's raw picture", "package darktable"]),
     ] {
         fs::write(&path, start).unwrap();
         assert_says(read_color(&path), &["a.jpg: it is", parts[0], parts[1]]);
     }
-    fs::write(&path, "<svg/>").unwrap();
-    assert_says(read_color(&path), &["a.jpg: not a PNG or JPEG file; convert it"]);
+    fs::write(&path, "hello").unwrap();
+    assert_says(read_color(&path), &["a.jpg: not a PNG, JPEG, TIFF, WebP, BMP or GIF file; convert it"]);
 }

@@ -134,7 +134,7 @@ fn a_damaged_picture_is_told_when_it_is_read() {
     scene.write("image_2/000002_10.png", "damaged");
     let recording = scene.open().unwrap();
     assert_eq!(recording.len(), 4);
-    assert_says(color_of(&recording, 2), &["image_2/000002_10.png: not a PNG or JPEG"]);
+    assert_says(color_of(&recording, 2), &["image_2/000002_10.png: not a PNG, JPEG, TIFF"]);
     scene.remove("image_3/000000_10.png");
     assert_says(scene.open(), &["image_2/000000_10.png: no picture of this name in image_3"]);
 }

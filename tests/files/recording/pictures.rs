@@ -162,7 +162,7 @@ fn all_pictures_need_one_size() {
     let scene = with_pictures(&["1.png", "2.png"]);
     scene.write("take/1.png", "damaged");
     let recording = open(&scene, "take").unwrap();
-    assert_says(color_of(&recording, 0), &["take/1.png: not a PNG or JPEG"]);
+    assert_says(color_of(&recording, 0), &["take/1.png: not a PNG, JPEG, TIFF"]);
     assert!(color_of(&recording, 1).is_ok());
 }
 

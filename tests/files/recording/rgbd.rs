@@ -168,7 +168,7 @@ fn names_that_do_not_pair_are_told() {
 fn a_faulty_picture_is_told_with_its_path() {
     let scene = scannet(2);
     scene.write("color/1.jpg", "no picture");
-    assert_says(color_of(&scene.open().unwrap(), 1), &["color/1.jpg: not a PNG or JPEG"]);
+    assert_says(color_of(&scene.open().unwrap(), 1), &["color/1.jpg: not a PNG, JPEG, TIFF"]);
     scene.write("depth/1.png", "");
     assert_says(depth_of(&scene.open().unwrap(), 1), &["depth/1.png: "]);
     scene.depth("depth/0.png", (7, 7), 5);

@@ -144,8 +144,8 @@ fn what_cannot_be_for_many_is_refused_before_anything_is_written() {
     fs::create_dir(home.path("none")).unwrap();
     for (arguments, expected) in [
         (&["shots", "other"][..], "shots/a.jpg and other/a.jpeg have the same result, out/a.jpg"),
-        (&["none"], "none: no PNG or JPEG there"),
-        (&["none/*.png"], "none/*.png: no PNG or JPEG there"),
+        (&["none"], "none: no picture there (PNG, JPEG, TIFF, WebP, BMP or HEIC)"),
+        (&["none/*.png"], "none/*.png: no picture there (PNG, JPEG, TIFF, WebP, BMP or HEIC)"),
         (&["shots/***"], "shots/***: this is no pattern"),
         (&["shots", "--debug-dir", "dir"], "--debug-dir shows the blur of one picture"),
         (&["shots", "--depth-map", "shots/a-depth.png"], "--depth-map shots/a-depth.png: for many pictures this is"),

@@ -57,7 +57,9 @@ pub(super) fn list_pictures(
         let found = expand(image)?;
         if found.is_empty() {
             let image = image.display();
-            return Err(CliError::Usage(format!("{image}: no PNG or JPEG there; recordings are for `stream`")));
+            return Err(CliError::Usage(format!(
+                "{image}: no picture there (PNG, JPEG, TIFF, WebP, BMP or HEIC); recordings are for `stream`"
+            )));
         }
         paths.extend(found.into_iter().filter(|path| seen.insert(place::resolve_links(path))));
     }
