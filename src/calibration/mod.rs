@@ -313,6 +313,7 @@ impl CameraIntrinsics {
     ///
     /// # Errors
     /// Same as for [`StereoCalibration::scale_to`].
+    #[cfg(feature = "files")]
     pub(crate) fn scaled_to(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
         self.scale_factor(size).map(|scale| self.scaled(size, scale))
     }

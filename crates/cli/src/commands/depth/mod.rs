@@ -45,7 +45,7 @@ Examples:
   bokehcam depth phone.jpg --out depth.pfm
   bokehcam depth left.png right.png --focal-px 707 --baseline-m 0.54 --metres --out depth.pfm")]
 pub struct DepthCommand {
-    /// Picture of the left camera, PNG or JPEG
+    /// Picture of the left camera
     left: PathBuf,
     /// Picture of the right camera; without it, LEFT is a photo of a phone, whose own depth is extracted
     right: Option<PathBuf>,

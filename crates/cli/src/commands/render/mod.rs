@@ -62,7 +62,7 @@ Examples:
   bokehcam render shots/ --out blurred/
   bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
 pub struct RenderCommand {
-    /// The picture, PNG or JPEG; or many of them: files, folders, or patterns such as 'shots/*.jpg'
+    /// The picture (PNG, JPEG, TIFF, WebP and others), or many of them: files, folders, or patterns such as 'shots/*.jpg'
     /// [default: the original picture of the snapshot in --like]
     #[arg(value_name = "IMAGE", required_unless_present = "like")]
     images: Vec<PathBuf>,
