@@ -232,6 +232,8 @@ def test_pictures_in_shards_with_their_depth_maps(tmp_path):
     for k in range(5):
         shutil.copy(PORTRAIT / "rgb" / f"{k:06}.png", pictures / f"p{k}.png")
         shutil.copy(PORTRAIT / "depth" / f"{k:06}.png", depths / f"p{k}.png")
+    # A mask is no picture.
+    shutil.copy(PORTRAIT / "depth" / "000000.png", pictures / "p0-mask.png")
     command = [pictures, "--out", out, "--depth-maps", depths, "--shard", "2", "--address", "local"]
     flags = ["--", "render", "--quality", "draft", "--focus", "0.5,0.5"]
     (depths / "p4.png").rename(tmp_path / "p4.png")

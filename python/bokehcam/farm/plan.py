@@ -20,6 +20,7 @@ PICTURES = (".png", ".jpg", ".jpeg")
 DEPTH_MAPS = (".png", ".pfm")
 # The program's names for the depth map next to a photo, which it finds itself.
 DEPTH_SUFFIXES = ("-depth", ".depth")
+MASK_SUFFIXES = ("-mask", ".mask")
 # Formats that each command can write; the first is the default.
 FORMATS = {"stream": ("mp4", "mkv", "webm", "y4m", "png"), "render": ("png", "jpg")}
 # Flags of the program that the farm sets itself, or that make no sense with it.
@@ -143,10 +144,20 @@ def expanded(command: str, source: Path) -> list[Path]:
         if path.suffix.lower() not in PICTURES:
             raise UsageError(f"{source}: not a PNG or JPEG; recordings are for `stream`")
         return [path]
+    entries = sorted(path.iterdir())
+    stems = {entry.stem for entry in entries}
+
+    def is_companion(stem: str) -> bool:
+        """Whether it is a depth map, or the mask of a picture that is there: the program leaves these out, too."""
+        is_mask = any(stem.endswith(end) and stem.removesuffix(end) in stems for end in MASK_SUFFIXES)
+        return is_mask or stem.endswith(DEPTH_SUFFIXES)
+
     pictures = [
         entry
-        for entry in sorted(path.iterdir())
-        if entry.suffix.lower() in PICTURES and not entry.name.startswith(".") and not entry.stem.endswith(DEPTH_SUFFIXES)
+        for entry in entries
+        if entry.suffix.lower() in PICTURES
+        and not entry.name.startswith(".")
+        and not is_companion(entry.stem)
     ]
     if not pictures:
         raise UsageError(f"{source}: it contains no pictures (PNG or JPEG); recordings are for `stream`")
