@@ -255,7 +255,7 @@ fn commands_take_plates_and_use_them() {
         (&["render", "me.png", "--depth", "defocus", "--out", "a.png"], 2, "equally sharp"),
         (&["stream", "synthetic", "--depth", "defocus", "--to", "null"], 2, "leave --depth out"),
         (&["plate", "synthetic", "--frames", "3", "--to", "room.png"], 1, "exists"),
-        (&["plate", "synthetic", "--frames", "3", "--to", "room.gif"], 1, "room.gif"),
+        (&["plate", "synthetic", "--frames", "3", "--to", "room.gif"], 2, "room.gif"),
     ] {
         home.run(arguments).refused(code, &[part]);
         assert!(!at("a.png").exists(), "{arguments:?}");
