@@ -179,7 +179,7 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
             // What a sensor does not see it writes as 0 or 65535, so that neither alone means anything.
             let is_stretched = low == 0.0 && high == 65535.0 && count >= STRETCHED && ranges[240..255].contains(&true);
             // 8 bits become 16 by either factor.
-            let is_coarse = [256, 257].iter().any(|step| known().all(|number| number as u32 % step == 0));
+            let is_coarse = [256, 257].iter().any(|step| known().all(|number| (number as u32).is_multiple_of(*step)));
             if is_stretched {
                 Some("numbers stretched from 0 to 65535")
             } else {
