@@ -7,7 +7,7 @@ use image::{ImageBuffer, Luma};
 
 use super::coded::EncodedPicture;
 use super::decode::{self, Scratch};
-use super::depth_file::{describe_stretch, has_same_view};
+use super::depth_file::{describe_stretch, is_stretchable};
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::upright::upright;
@@ -46,7 +46,7 @@ pub fn read(path: &Path, color: (u32, u32)) -> Result<MaskFile, RecordingError> 
     let read = || {
         let (mask, note) = read_unfitted(path)?;
         let (width, height) = (mask.width, mask.height);
-        if !has_same_view((width, height), color) && width != height {
+        if !is_stretchable((width, height), color) {
             return Err(PictureFault::MaskSize { found: (width, height), color });
         }
         let notes = note.into_iter().chain(describe_stretch((width, height), color)).collect();

@@ -27,6 +27,12 @@ pub fn has_same_view(depth: (u32, u32), color: (u32, u32)) -> bool {
     depth.0 > 0 && depth.1 > 0 && (a - b).abs() <= (MAX_SKEW * a.max(b)).max(width.max(height))
 }
 
+/// Returns whether a map or mask is stretched to its picture without being asked: it has the same view, or is a square, as
+/// networks make of every picture.
+pub fn is_stretchable(found: (u32, u32), color: (u32, u32)) -> bool {
+    has_same_view(found, color) || found.0 == found.1
+}
+
 /// Returns whether a depth map of this size covers the view of a colour picture: it is not larger, and has the same
 /// aspect ratio within 2 % or one pixel.
 pub fn covers(depth: (u32, u32), color: (u32, u32)) -> bool {
@@ -36,14 +42,12 @@ pub fn covers(depth: (u32, u32), color: (u32, u32)) -> bool {
 /// Fits the map to a picture of `color` (columns, rows) pixels: it then covers it with at most as many pixels.
 ///
 /// # Errors
-/// It has another aspect ratio, and `fit` does not say what to do. Squares are what networks make of every picture, and
-/// are stretched.
+/// It has another aspect ratio, is not [`is_stretchable`], and `fit` does not say what to do.
 pub(super) fn fit_to(file: &mut DepthFile, fit: Option<Fit>, color: (u32, u32)) -> Result<(), PictureFault> {
     let found = file.map.size();
-    let is_same_view = has_same_view(found, color);
-    if fit == Some(Fit::Crop) && !is_same_view {
+    if fit == Some(Fit::Crop) && !has_same_view(found, color) {
         crop(&mut file.map, color);
-    } else if !(is_same_view || fit.is_some() || found.0 == found.1) {
+    } else if fit.is_none() && !is_stretchable(found, color) {
         return Err(PictureFault::DepthSize { found, color });
     }
     let (width, height) = file.map.size();

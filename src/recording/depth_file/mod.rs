@@ -13,7 +13,7 @@ mod values;
 
 use std::path::Path;
 
-pub use fit::{Fit, covers, describe_stretch, has_same_view};
+pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, read_inside};
 pub use unit::DepthUnit;
 
