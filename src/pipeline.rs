@@ -32,7 +32,7 @@ use buffers::{BufferCounts, MAX_IN_FLIGHT, Pools};
 pub use change::{Change, ChangeSender, ExecutorChange};
 pub use error::{Fault, PipelineError};
 pub use output_request::OutputRequest;
-pub use start::{BlurSetup, Pace, Run};
+pub use start::{BlurSetup, Destination, Pace, Run};
 use threads::{join_stage, run_guarded, spawn_stage};
 pub use view::{Progress, Trace, View};
 
@@ -89,7 +89,7 @@ impl Shared {
     }
 }
 
-/// Runs the pipeline until the frames end, the sink ends or the stop flag is set, and completes the output in any case.
+/// Runs the pipeline until the frames end, the sink ends or the stop flag is set, and completes an owned output in any case.
 ///
 /// # Errors
 /// Returns the fault of the stage that failed, a panic included, with the report. The output then has the frames
@@ -101,7 +101,8 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let Shared { info, counter, has_ended, .. } = &shared;
     let mut timings = Timings::default();
     let Timings { decode, depth: of_depth, blur: of_blur, sink: of_sink } = &mut timings;
-    let (mut sink, pace, stop) = (run.sink, run.pace, run.stop);
+    let (mut destination, pace, stop) = (run.sink, run.pace, run.stop);
+    let sink = destination.sink();
     let about =
         RunInfo { source: info.name.clone(), sink: sink.describe(), budget_ns: run.budget_ns, ..RunInfo::default() };
 
@@ -109,7 +110,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let depth =
         depth::Stage::new((preprocessor, run.look.reuse), run.depth, (run.changes, run.adaptive), &shared, of_depth);
     let blur = blur::Stage::new(blur, run.output_request.filter(|_| !run.mirror), run.budget_ns, &shared, of_blur);
-    let deliver = deliver::Stage::new(&mut *sink, (run.view, run.progress), run.mirror, &shared, of_sink);
+    let deliver = deliver::Stage::new(sink, (run.view, run.progress), run.mirror, &shared, of_sink);
     let ((to_depth, from_capture), (to_blur, from_depth), (to_sink, from_blur)) =
         (create_link(pace), create_link(pace), create_link(pace));
     let ended = thread::scope(|scope| {
@@ -126,8 +127,12 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     let is_cut =
         stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| counter.frame_counts().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Truncated } else { Ending::Complete };
+    let sink = destination.sink();
     let (outputs, nodes) = (sink.output_counters(), sink.node_counters());
-    let finished = run_guarded("sink", has_ended, move || Ok(sink.finish(ending)?));
+    let finished = run_guarded("sink", has_ended, move || match destination {
+        Destination::Owned(sink) => Ok(sink.finish(ending)?),
+        Destination::Lent(_) => Ok(()),
+    });
     // Only now have the outputs written all frames.
     let about = RunInfo {
         outputs: sink::read_counters(&outputs),

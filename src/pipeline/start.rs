@@ -60,6 +60,24 @@ impl BlurSetup {
     }
 }
 
+/// Where the frames of a run go.
+pub enum Destination<'a> {
+    /// A sink that is completed at the end of the run.
+    Owned(Box<dyn Sink>),
+    /// A sink that outlives the run: it is not completed, and other runs may follow.
+    Lent(&'a mut dyn Sink),
+}
+
+impl<'a> Destination<'a> {
+    /// Returns the sink, for the frames.
+    pub(super) fn sink(&mut self) -> &mut (dyn Sink + 'a) {
+        match self {
+            Self::Owned(sink) => &mut **sink,
+            Self::Lent(sink) => &mut **sink,
+        }
+    }
+}
+
 /// Everything a run consists of.
 pub struct Run<'a> {
     /// The source of the frames.
@@ -79,7 +97,7 @@ pub struct Run<'a> {
     /// The changes of the blur; `None` keeps everything as it is.
     pub changes: Option<mpsc::Receiver<Change>>,
     /// The destination of the frames.
-    pub sink: Box<dyn Sink>,
+    pub sink: Destination<'a>,
     /// Real time, or all frames.
     pub pace: Pace,
     /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, if depth and blur do
@@ -125,7 +143,10 @@ impl<'a> Run<'a> {
             .map(|settings| ComputeOptions::default().create_blur(&settings, size))
             .transpose()?;
         let blurring = BlurSetup { look, bokeh, adaptive: false, changes: None };
-        Ok(Self { measured: depth.is_some(), ..Self::with_blur(camera, depth, blurring, sink, stop) })
+        Ok(Self {
+            measured: depth.is_some(),
+            ..Self::with_blur(camera, depth, blurring, Destination::Owned(sink), stop)
+        })
     }
 
     /// Creates a run like [`Run::new`] with a given blur; depth is not assumed to be measured.
@@ -133,7 +154,7 @@ impl<'a> Run<'a> {
         camera: Box<dyn Camera>,
         depth: Option<Box<dyn DepthSource>>,
         BlurSetup { look, bokeh, adaptive, changes }: BlurSetup,
-        sink: Box<dyn Sink>,
+        sink: Destination<'a>,
         stop: &'a AtomicBool,
     ) -> Self {
         Self {

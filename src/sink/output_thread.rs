@@ -11,6 +11,7 @@ use std::{io, mem};
 
 use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::frame::ColorImage;
+use crate::frame::fit::Letterbox;
 use crate::link::{self, Abandoned, Received, Sender, Sent};
 use crate::stats::{NodeCounts, OutputCounts};
 
@@ -86,13 +87,14 @@ pub enum Backpressure {
 
 impl OutputThread {
     /// Starts a thread that passes pictures to `sink`, and calls `on_end` once the sink has ended, with the number of
-    /// frames received.
+    /// frames received. Pictures of another size than `size` are scaled into it.
     ///
     /// # Errors
     /// The system refuses the thread; the sink is aborted.
     pub fn start(
         sink: Box<dyn Sink>,
         backpressure: Backpressure,
+        size: Option<(u32, u32)>,
         on_end: impl FnOnce(u64, &Outcome) + Send + 'static,
     ) -> io::Result<Self> {
         let (sender, receiver) = if backpressure == Backpressure::DropOldest { link::live() } else { link::lossless() };
@@ -101,9 +103,11 @@ impl OutputThread {
         let (shared, sink_name) = (Arc::<Shared>::default(), name.clone());
         let (outcome_sender, outcome) = mpsc::channel();
         let thread_shared = Arc::clone(&shared);
+        // A live output scales pictures itself, into the size that its readers ask for.
+        let fit = size.filter(|_| !is_live).map(Fit::new);
         let run = move || {
             // A panic is an error of this output only.
-            let ended = catch_unwind(AssertUnwindSafe(|| serve_sink(sink, receiver, &thread_shared)));
+            let ended = catch_unwind(AssertUnwindSafe(|| serve_sink(sink, receiver, fit, &thread_shared)));
             let outcome = ended.unwrap_or_else(|panic| {
                 let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
                 Outcome::Failed(SinkError::Panic { sink: sink_name, what: text.unwrap_or("no reason given").into() })
@@ -209,14 +213,19 @@ impl Drop for OutputThread {
 }
 
 /// Passes pictures to a sink until no more come, and completes it.
-fn serve_sink(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>>, shared: &Shared) -> Outcome {
+fn serve_sink(
+    mut sink: Box<dyn Sink>,
+    mut receiver: link::Receiver<Arc<Picture>>,
+    mut fit: Option<Fit>,
+    shared: &Shared,
+) -> Outcome {
     loop {
         let received = match sink.repeat_interval() {
             Some(interval) => receiver.recv_timeout(interval),
             None => receiver.recv().map_or(Received::Ended, Received::Item),
         };
         let flow = match received {
-            Received::Item(picture) => write_picture(&mut *sink, &picture, shared),
+            Received::Item(picture) => write_picture(&mut *sink, &picture, fit.as_mut(), shared),
             Received::Nothing => sink.repeat_frame().map(|flow| {
                 let repeats = u64::from(flow == ControlFlow::Continue(true));
                 shared.repeats.fetch_add(repeats, Ordering::Relaxed);
@@ -240,13 +249,21 @@ fn serve_sink(mut sink: Box<dyn Sink>, mut receiver: link::Receiver<Arc<Picture>
     }
 }
 
-fn write_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Result<ControlFlow<()>, SinkError> {
+fn write_picture(
+    sink: &mut dyn Sink,
+    picture: &Picture,
+    fit: Option<&mut Fit>,
+    shared: &Shared,
+) -> Result<ControlFlow<()>, SinkError> {
     let Picture { image, alpha, time_ns, captured_ns, is_card } = picture;
     sink.set_capture_time(*captured_ns);
-    let flow = match (*is_card, alpha.is_empty()) {
-        (true, _) => sink.write_card(image, *time_ns)?,
-        (false, true) => sink.write_frame(image, *time_ns)?,
-        (false, false) => sink.write_with_alpha(image, alpha, *time_ns)?,
+    let fitted = fit.map_or(image, |fit| fit.apply(image));
+    // A picture that had to be scaled is of another source, and comes without its alpha channel.
+    let has_alpha = !alpha.is_empty() && fitted.size() == image.size();
+    let flow = match (*is_card, has_alpha) {
+        (true, _) => sink.write_card(fitted, *time_ns)?,
+        (false, false) => sink.write_frame(fitted, *time_ns)?,
+        (false, true) => sink.write_with_alpha(fitted, alpha, *time_ns)?,
     };
     if flow.is_continue() {
         shared.frames.fetch_add(1, Ordering::Relaxed);
@@ -254,6 +271,28 @@ fn write_picture(sink: &mut dyn Sink, picture: &Picture, shared: &Shared) -> Res
         shared.shows_card.store(*is_card, Ordering::Release);
     }
     Ok(flow)
+}
+
+/// Scales the pictures of later sources to the size of the first one, with which the output was opened.
+struct Fit {
+    size: (u32, u32),
+    letterbox: Letterbox,
+    fitted: ColorImage,
+}
+
+impl Fit {
+    fn new(size: (u32, u32)) -> Self {
+        Self { size, letterbox: Letterbox::default(), fitted: ColorImage::default() }
+    }
+
+    fn apply<'a>(&'a mut self, image: &'a ColorImage) -> &'a ColorImage {
+        if image.size() == self.size {
+            return image;
+        }
+        self.fitted.resize(self.size.0, self.size.1);
+        self.letterbox.fit(image, &mut self.fitted);
+        &self.fitted
+    }
 }
 
 /// A pool of pictures, sized by the number that the outputs hold at a time; each is copied once for all outputs.

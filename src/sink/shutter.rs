@@ -41,8 +41,11 @@ pub struct Shutter {
     last_ns: Option<u64>,
     /// When a picture was last sent to the sink.
     sent_ns: u64,
-    /// How far the sink's time is ahead of the source's, which stands still while the camera is released.
+    /// How far the sink's time is ahead of the source's, which stands still while the camera is released; wraps around
+    /// for a source whose clock is ahead.
     offset_ns: u64,
+    /// Whether the next picture is the first one of another source, whose clock began elsewhere.
+    is_first_of_source: bool,
 }
 
 /// Longest delay of the card, whatever the time of the next frame; and the period while no pictures come that it would
@@ -102,8 +105,26 @@ impl Shutter {
             last_ns: None,
             sent_ns: 0,
             offset_ns: 0,
+            is_first_of_source: false,
         };
         (shutter, ShutterControl { closed, request_sender, whole_sink })
+    }
+
+    /// Prepares for the pictures of another source, of `size` pixels every `period`: the sink's time goes on from the last
+    /// picture by the time that has passed.
+    pub fn begin_source(&mut self, size: (u32, u32), period: Duration) {
+        if self.size != size {
+            (self.size, self.card) = (size, OnceCell::new());
+        }
+        (self.period, self.is_first_of_source) = (period, true);
+    }
+
+    /// Shows the card until the next picture, because no source is open.
+    ///
+    /// # Errors
+    /// Those of [`Sink::write_frame`].
+    pub fn show_card(&mut self) -> Written {
+        self.send_card(self.time_now_ns())
     }
 
     /// Withholds the demand once the card is shown, which releases the camera; returns whether it is closed.
@@ -188,16 +209,22 @@ impl Shutter {
         Duration::from_nanos(self.clock.now_ns().saturating_sub(self.sent_ns))
     }
 
+    /// Returns the sink's time now: later than that of the last picture.
+    fn time_now_ns(&self) -> u64 {
+        self.last_ns.map_or(0, |last_ns| last_ns + (self.time_since_sent().as_nanos() as u64).max(1))
+    }
+
     /// Converts the source's time to the sink's: later than the previous one.
     fn convert_time_ns(&mut self, time_ns: u64) -> u64 {
-        let period_ns = self.period.as_nanos() as u64;
-        match self.last_ns {
-            Some(last_ns) if self.shows_card && time_ns + self.offset_ns <= last_ns => {
-                self.offset_ns = last_ns + period_ns - time_ns;
+        let is_first_of_source = std::mem::take(&mut self.is_first_of_source);
+        if let Some(last_ns) = self.last_ns {
+            if is_first_of_source {
+                self.offset_ns = self.time_now_ns().wrapping_sub(time_ns);
+            } else if self.shows_card && time_ns.wrapping_add(self.offset_ns) <= last_ns {
+                self.offset_ns = (last_ns + self.period.as_nanos() as u64).wrapping_sub(time_ns);
             }
-            _ => {}
         }
-        time_ns + self.offset_ns
+        time_ns.wrapping_add(self.offset_ns)
     }
 }
 
@@ -268,8 +295,7 @@ impl Sink for Shutter {
             if self.shows_card && time_since_sent < self.period {
                 return Ok(ControlFlow::Continue(false));
             }
-            let time_ns = self.last_ns.map_or(0, |last_ns| last_ns + (time_since_sent.as_nanos() as u64).max(1));
-            return Ok(self.send_card(time_ns)?.map_continue(|()| true));
+            return Ok(self.send_card(self.time_now_ns())?.map_continue(|()| true));
         }
         if self.sink.repeat_interval().is_none_or(|due| time_since_sent < due) {
             return Ok(ControlFlow::Continue(false));

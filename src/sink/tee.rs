@@ -23,8 +23,7 @@ use crate::stats::{NodeCounts, OutputCounts};
 /// continue without any sink. Recordings are always kept: without [`Sink::finish`], these sinks are completed on drop.
 pub struct Tee {
     name: String,
-    /// The outputs, with the names under which they were added.
-    outputs: Vec<(String, OutputThread)>,
+    outputs: Vec<Member>,
     /// Removed outputs that are being completed.
     closing: Vec<OutputThread>,
     /// Requests of the control, if there is one.
@@ -34,10 +33,20 @@ pub struct Tee {
     closed: Arc<AtomicBool>,
     picture_pool: PicturePool,
     captured_ns: u64,
+    /// Time of the last picture.
+    last_ns: u64,
     /// The first error of an output.
     first_error: Option<SinkError>,
     output_counters: Vec<Counter<OutputCounts>>,
     node_counters: Vec<Counter<NodeCounts>>,
+}
+
+/// An output, with the name under which it was added.
+struct Member {
+    name: String,
+    output: OutputThread,
+    /// Whether frames are withheld from it: it shows the card.
+    is_withheld: bool,
 }
 
 /// Period of checks for ended outputs, for requests, and for space where frames wait.
@@ -58,7 +67,7 @@ impl Tee {
             // Live outputs never wait.
             let policy = if sink.is_live() { Backpressure::DropOldest } else { backpressure };
             let name = sink.describe();
-            OutputThread::start(sink, policy, |_, _| {}).map_err(|cause| SinkError::Thread { sink: name, cause })
+            OutputThread::start(sink, policy, None, |_, _| {}).map_err(|cause| SinkError::Thread { sink: name, cause })
         };
         let mut outputs = sinks.into_iter().map(start).collect::<Result<Vec<_>, _>>()?;
         let name = outputs.iter().map(|output| output.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -91,6 +100,7 @@ impl Tee {
             closed,
             picture_pool: PicturePool::default(),
             captured_ns: 0,
+            last_ns: 0,
             first_error: None,
             output_counters: Vec::new(),
             node_counters: Vec::new(),
@@ -100,15 +110,20 @@ impl Tee {
     fn add_output(&mut self, name: String, output: OutputThread) {
         self.output_counters.push(output.create_counter());
         self.node_counters.extend_from_slice(output.node_counters());
-        self.outputs.push((name, output));
+        self.outputs.push(Member { name, output, is_withheld: false });
     }
 
     /// Handles the control's pending requests, and forgets outputs that have ended.
     fn handle_requests(&mut self) {
         while let Some(request) = self.requests.as_ref().and_then(|requests| requests.try_recv().ok()) {
             let name = request.name().to_owned();
-            if let Some(at) = self.outputs.iter().position(|(output, _)| *output == name) {
-                let (_, mut output) = self.outputs.remove(at);
+            let at = self.outputs.iter().position(|member| member.name == name);
+            if let Request::Withhold(_, card) = request {
+                at.into_iter().for_each(|at| self.withhold_frames(at, card.as_deref()));
+                continue;
+            }
+            if let Some(at) = at {
+                let mut output = self.outputs.remove(at).output;
                 output.close(Ending::Complete);
                 self.closing.push(output);
             }
@@ -119,7 +134,17 @@ impl Tee {
             }
         }
         if self.requests.is_some() {
-            self.outputs.retain_mut(|(_, output)| output.try_outcome().is_none());
+            self.outputs.retain_mut(|member| member.output.try_outcome().is_none());
+            self.closing.retain_mut(|output| output.try_outcome().is_none());
+        }
+    }
+
+    /// Sends output number `at` the card, which it repeats, and no frames from now on; `None` sends it frames again.
+    fn withhold_frames(&mut self, at: usize, card: Option<&ColorImage>) {
+        self.outputs[at].is_withheld = card.is_some();
+        if let Some(card) = card {
+            let picture = self.picture_pool.copy_frame((card, &[]), (self.last_ns, self.captured_ns), true);
+            self.outputs[at].output.send(picture, TICK);
         }
     }
 
@@ -133,7 +158,8 @@ impl Tee {
         self.handle_requests();
         if !self.outputs.is_empty() {
             let picture = self.picture_pool.copy_frame(frame, (time_ns, self.captured_ns), is_card);
-            for (_, output) in &mut self.outputs {
+            self.last_ns = time_ns;
+            for Member { output, .. } in self.outputs.iter_mut().filter(|member| !member.is_withheld) {
                 let mut unsent = output.send(Arc::clone(&picture), TICK);
                 while let Some(picture) = unsent {
                     if self.closed.load(Ordering::Acquire) {
@@ -155,17 +181,17 @@ impl Tee {
         }
         let mut at = 0;
         while at < self.outputs.len() {
-            let Some(outcome) = self.outputs[at].1.try_outcome() else {
+            let Some(outcome) = self.outputs[at].output.try_outcome() else {
                 at += 1;
                 continue;
             };
-            let is_live = self.outputs.remove(at).1.is_live;
+            let is_live = self.outputs.remove(at).output.is_live;
             match outcome {
                 Outcome::Failed(error) if is_live => return Err(error),
                 outcome => self.record_error(outcome.error()),
             }
         }
-        if self.outputs.iter().any(|(_, output)| output.is_open()) {
+        if self.outputs.iter().any(|member| member.output.is_open()) {
             return Ok(ControlFlow::Continue(()));
         }
         match self.first_error.take_if(|_| self.outputs.is_empty()) {
@@ -189,11 +215,11 @@ impl Tee {
     /// were reported to a control's owner.
     fn finish_outputs(&mut self, ending: Ending) -> Result<(), SinkError> {
         self.handle_requests();
-        self.outputs.iter_mut().for_each(|(_, output)| output.close(ending));
+        self.outputs.iter_mut().for_each(|member| member.output.close(ending));
         let is_reported = self.requests.is_some();
         let all = mem::take(&mut self.closing)
             .into_iter()
-            .chain(mem::take(&mut self.outputs).into_iter().map(|(_, output)| output));
+            .chain(mem::take(&mut self.outputs).into_iter().map(|member| member.output));
         let ended: Vec<_> = all.map(OutputThread::join).collect();
         // Failures during the run that were reported to the control's owner are not errors of the run.
         let ended = ended.into_iter().filter(|outcome| !(is_reported && matches!(outcome, Outcome::Failed(_))));
@@ -215,7 +241,7 @@ impl Sink for Tee {
 
     /// Its outputs all do, or none does: a run is refused otherwise.
     fn keeps_alpha(&self) -> bool {
-        !self.outputs.is_empty() && self.outputs.iter().all(|(_, output)| output.keeps_alpha)
+        !self.outputs.is_empty() && self.outputs.iter().all(|member| member.output.keeps_alpha)
     }
 
     fn write_with_alpha(
@@ -232,17 +258,17 @@ impl Sink for Tee {
     }
 
     fn is_live(&self) -> bool {
-        self.requests.is_none() && self.outputs.iter().any(|(_, output)| output.is_live)
+        self.requests.is_none() && self.outputs.iter().any(|member| member.output.is_live)
     }
 
     fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
-        self.outputs.iter().filter_map(|(_, output)| output.without_card()).collect()
+        self.outputs.iter().filter_map(|member| member.output.without_card()).collect()
     }
 
     /// Counters of all outputs ever added; with a control, only of the current ones.
     fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
         match self.requests {
-            Some(_) => self.outputs.iter().flat_map(|(_, output)| output.node_counters()).cloned().collect(),
+            Some(_) => self.outputs.iter().flat_map(|member| member.output.node_counters()).cloned().collect(),
             None => self.node_counters.clone(),
         }
     }

@@ -1,4 +1,4 @@
-//! Adds and removes the sinks of a [`Tee`] while frames flow, and reports their outcome.
+//! Adds and removes the sinks of a [`Tee`] while frames flow, withholds the frames from them, and reports their outcome.
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -7,8 +7,9 @@ use super::Sink;
 #[cfg(doc)]
 use super::Tee;
 use super::output_thread::{Backpressure, Outcome, OutputThread};
+use crate::frame::ColorImage;
 
-/// Adds and removes members of a [`Tee`], from any thread. Both take effect with the next frame, or soon after if there
+/// Adds, removes and withholds frames from members of a [`Tee`], from any thread. All take effect with the next frame, or soon after if there
 /// are no frames.
 #[derive(Clone)]
 pub struct TeeControl {
@@ -21,6 +22,8 @@ pub struct TeeControl {
 pub struct MemberEvent {
     /// The name under which it was added.
     pub member: String,
+    /// The number under which it was added: tells it from an earlier member of the same name.
+    pub number: u64,
     /// Its new state.
     pub state: MemberState,
 }
@@ -55,6 +58,8 @@ type ReportFn = Arc<dyn Fn(MemberEvent) + Send + Sync>;
 pub(super) enum Request {
     Add(NewMember),
     Remove(String),
+    /// Withholds the frames from a member and shows it the card, or passes them again.
+    Withhold(String, Option<Box<ColorImage>>),
 }
 
 impl Request {
@@ -62,7 +67,7 @@ impl Request {
     pub fn name(&self) -> &str {
         match self {
             Self::Add(member) => &member.reporter.name,
-            Self::Remove(name) => name,
+            Self::Remove(name) | Self::Withhold(name, _) => name,
         }
     }
 }
@@ -75,13 +80,21 @@ impl TeeControl {
         (Self { request_sender, report: Arc::new(report) }, requests)
     }
 
-    /// Adds a sink. A member with the same name is completed first.
+    /// Adds a sink that was opened for pictures of `size` pixels; those of another size are scaled into it. A member with
+    /// the same name is completed first. `number` comes back in its events.
     ///
     /// # Errors
     /// The run has ended: the sink was aborted, which is reported as well.
-    pub fn add(&self, name: &str, sink: Box<dyn Sink>) -> Result<(), RunEnded> {
-        let reporter = Reporter { name: name.into(), is_reported: false, report: Arc::clone(&self.report) };
-        self.request_sender.send(Request::Add(NewMember { sink, reporter })).map_err(|_| RunEnded)
+    pub fn add(&self, name: &str, number: u64, size: (u32, u32), sink: Box<dyn Sink>) -> Result<(), RunEnded> {
+        let reporter = Reporter { name: name.into(), number, is_reported: false, report: Arc::clone(&self.report) };
+        self.request_sender.send(Request::Add(NewMember { sink, size, reporter })).map_err(|_| RunEnded)
+    }
+
+    /// Withholds the frames from the live member with this name: it shows `card` from now on. `None` passes the frames
+    /// again. Does nothing if there is no such member.
+    pub fn withhold(&self, name: &str, card: Option<ColorImage>) {
+        // Without a run, there are no members.
+        let _ = self.request_sender.send(Request::Withhold(name.into(), card.map(Box::new)));
     }
 
     /// Removes the member with this name and completes it; does nothing if it does not exist.
@@ -94,21 +107,24 @@ impl TeeControl {
 /// A sink to be added. Fields drop in this order: first the sink, then the report.
 pub(super) struct NewMember {
     sink: Box<dyn Sink>,
+    size: (u32, u32),
     reporter: Reporter,
 }
 
 impl NewMember {
     /// Starts its thread; `None` if the system refuses the thread, and the member is reported as failed.
     pub fn start(self) -> Option<OutputThread> {
-        let Self { sink, reporter } = self;
+        let Self { sink, size, reporter } = self;
         reporter.report(MemberState::Started);
-        OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| reporter.report_end(frames, outcome)).ok()
+        let on_end = |frames, outcome: &Outcome| reporter.report_end(frames, outcome);
+        OutputThread::start(sink, Backpressure::DropOldest, Some(size), on_end).ok()
     }
 }
 
 /// Reports a member's outcome exactly once.
 struct Reporter {
     name: String,
+    number: u64,
     /// Whether its end was reported.
     is_reported: bool,
     report: ReportFn,
@@ -116,7 +132,7 @@ struct Reporter {
 
 impl Reporter {
     fn report(&self, state: MemberState) {
-        (self.report)(MemberEvent { member: self.name.clone(), state });
+        (self.report)(MemberEvent { member: self.name.clone(), number: self.number, state });
     }
 
     /// Reports how a member ended that received `frames` frames.

@@ -52,9 +52,8 @@ use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::{Look, SourceDepth};
 use crate::optics::StereoRig;
-use crate::pipeline::{BlurSetup, Run};
+use crate::pipeline::{BlurSetup, Destination, Run};
 use crate::recording::{DepthUnit, Options as Reading, Recording, Scratch};
-use crate::sink::Sink;
 
 /// The origin of depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -278,7 +277,7 @@ impl Source {
     }
 
     /// Creates a run of its frames ([`Run::with_blur`]) with this blur into `sink`, as fast as possible. `stop` ends the run.
-    pub fn into_run(self, blurring: BlurSetup, sink: Box<dyn Sink>, stop: &AtomicBool) -> Run<'_> {
+    pub fn into_run<'a>(self, blurring: BlurSetup, sink: Destination<'a>, stop: &'a AtomicBool) -> Run<'a> {
         let measured = self.is_measured();
         Run { measured, ..Run::with_blur(self.camera, self.depth, blurring, sink, stop) }
     }

@@ -72,7 +72,6 @@ impl Heard {
             output_request: Arc::default(),
             demand: demand.clone(),
             off: Arc::default(),
-            shutter: Arc::default(),
         };
         let session = Session::start(config, Arc::new(|| {})).unwrap();
         let (told, blurred) = (Vec::new(), Vec::new());

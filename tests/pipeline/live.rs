@@ -9,7 +9,7 @@ use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData,
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::pipeline::{Pace, Run, run};
+use bokehcam::pipeline::{Destination, Pace, Run, run};
 use bokehcam::sink::{Sink, SinkError};
 
 use crate::fakes::{PERIOD_NS, SIZE};
@@ -98,7 +98,12 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         measured: false,
         threads: 1,
         changes: None,
-        sink: Box::new(Screen { demand: demand.clone(), watch: None, shown: 0, phases: Arc::clone(&phases) }),
+        sink: Destination::Owned(Box::new(Screen {
+            demand: demand.clone(),
+            watch: None,
+            shown: 0,
+            phases: Arc::clone(&phases),
+        })),
         pace: Pace::Realtime,
         budget_ns: PERIOD_NS,
         keep_going: false,

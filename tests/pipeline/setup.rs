@@ -7,7 +7,7 @@ use bokehcam::budget::Quality;
 use bokehcam::capture::{Camera, FrameData};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Strength};
-use bokehcam::pipeline::{BlurSetup, Pace, PipelineError, Progress, Run, run};
+use bokehcam::pipeline::{BlurSetup, Destination, Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::Sink;
 use bokehcam::stats::Report;
 
@@ -92,7 +92,7 @@ impl Setup {
                     stop.store(true, Ordering::Relaxed);
                 }
             },
-            ..Run::with_blur(Box::new(camera), depth, blurring, Box::new(sink), &stop)
+            ..Run::with_blur(Box::new(camera), depth, blurring, Destination::Owned(Box::new(sink)), &stop)
         });
         let report = match &result {
             Ok(report) => report,

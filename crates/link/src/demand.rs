@@ -11,6 +11,8 @@ pub struct Demand(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
+    /// Counts the watchers as well.
+    parent: Option<Demand>,
     watched: AtomicUsize,
     withheld: AtomicBool,
     event: AutoResetEvent,
@@ -19,7 +21,17 @@ struct Shared {
 impl Demand {
     /// Demand without watchers.
     pub fn new() -> Self {
+        Self::with_parent(None)
+    }
+
+    /// Creates a part of this demand: its watchers count in both.
+    pub fn new_part(&self) -> Self {
+        Self::with_parent(Some(self.clone()))
+    }
+
+    fn with_parent(parent: Option<Self>) -> Self {
         Self(Arc::new(Shared {
+            parent,
             watched: AtomicUsize::new(0),
             withheld: AtomicBool::new(false),
             event: AutoResetEvent::new(),
@@ -31,7 +43,8 @@ impl Demand {
         self.0.watched.fetch_add(1, Ordering::Release);
         // After the count, or the waiter could wake, see no watcher and sleep on.
         self.0.event.set();
-        Watch(self.clone())
+        let parent = self.0.parent.as_ref().map(|parent| Box::new(parent.watch()));
+        Watch { demand: self.clone(), _parent: parent }
     }
 
     /// Whether any output is watched and not withheld.
@@ -73,11 +86,15 @@ impl Default for Demand {
 
 /// A watched output; it stops counting when dropped.
 #[derive(Debug)]
-pub struct Watch(Demand);
+pub struct Watch {
+    demand: Demand,
+    /// Counts in the demand that this one is a part of.
+    _parent: Option<Box<Watch>>,
+}
 
 impl Drop for Watch {
     fn drop(&mut self) {
-        self.0.0.watched.fetch_sub(1, Ordering::Release);
+        self.demand.0.watched.fetch_sub(1, Ordering::Release);
     }
 }
 
@@ -96,6 +113,20 @@ mod tests {
         assert!(demand.is_watched());
         drop(second);
         assert!(!demand.is_watched());
+    }
+
+    #[test]
+    fn a_watcher_of_a_part_counts_in_the_whole_and_not_in_other_parts() {
+        let whole = Demand::new();
+        let (part, other) = (whole.new_part(), whole.new_part());
+        let watch = part.watch();
+        assert!(whole.is_watched() && part.is_watched() && !other.has_watchers());
+        whole.withhold(true);
+        assert!(!whole.is_watched() && part.has_watchers());
+        drop(watch);
+        assert!(!whole.has_watchers() && !part.has_watchers());
+        let _watch = whole.watch();
+        assert!(!part.has_watchers());
     }
 
     #[test]

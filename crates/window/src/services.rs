@@ -1,13 +1,10 @@
 //! System services of a session: sources, outputs, executors, and the settings file. Errors are one line of text.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::camera_control::CameraControl;
 use bokehcam::look::{Look, presets::Preset};
-use bokehcam::sink::Sink;
+use bokehcam::sink::{self, Sink};
 use bokehcam::source::{Source, devices::Choice};
 
 /// A command-line option that is not part of the look: name and value.
@@ -108,18 +105,11 @@ pub trait Services: Send {
     /// Fails if the requested GPU does not exist.
     fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
 
-    /// Opens an output, a virtual camera or a file, for pictures of `size` pixels every `period_ns`; it ends once
-    /// `stop` is set.
+    /// Opens an output, a virtual camera or a file, with these options, which the services complete.
     ///
     /// # Errors
     /// Fails if it cannot be opened.
-    fn open_output(
-        &mut self,
-        name: &str,
-        size: (u32, u32),
-        period_ns: u64,
-        stop: &Arc<AtomicBool>,
-    ) -> Result<Box<dyn Sink>, String>;
+    fn open_output(&mut self, name: &str, options: sink::Options) -> Result<Box<dyn Sink>, String>;
 
     /// Returns the command that shows `source` with this look: `bokehcam preview ...` with the window's `switches`, or
     /// `bokehcam stream ...` into `outputs`.

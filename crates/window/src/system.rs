@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use super::dialog;
 use super::services::{CliOption, FileChooser, OpenedSource, PathKind, Services, SettingsStore};
@@ -305,18 +303,10 @@ impl Services for System {
         self.executors.create_blur(settings, size).map_err(|error| error.to_string())
     }
 
-    fn open_output(
-        &mut self,
-        name: &str,
-        size: (u32, u32),
-        period_ns: u64,
-        stop: &Arc<AtomicBool>,
-    ) -> Result<Box<dyn Sink>, String> {
-        let (force, out_size, threads, stop) =
-            (self.force, self.out_size, self.options.computing.threads, Arc::clone(stop));
-        let options = sink::Options { force, out_size, threads, stop, ..sink::Options::new(size, period_ns) };
+    fn open_output(&mut self, name: &str, options: sink::Options) -> Result<Box<dyn Sink>, String> {
+        let (force, out_size, threads) = (self.force, self.out_size, self.options.computing.threads);
         let target = Target::from_str(name).map_err(|error| error.to_string())?;
-        target.open(&options).map_err(|error| error.to_string())
+        target.open(&sink::Options { force, out_size, threads, ..options }).map_err(|error| error.to_string())
     }
 
     fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {

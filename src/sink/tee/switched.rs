@@ -9,6 +9,8 @@ use std::time::Instant;
 use super::*;
 use crate::sink::tee_control::{MemberState, RunEnded};
 
+/// Size of the frames.
+const SIZE: (u32, u32) = (2, 2);
 /// No step takes this long: detects a hang.
 const HANG: Duration = Duration::from_secs(120);
 
@@ -73,18 +75,23 @@ fn switch() -> (Box<Tee>, TeeControl, Receiver<MemberEvent>) {
     (Box::new(switch), control, told)
 }
 
+/// Returns a frame with this value in every sample.
+fn filled(value: u8) -> ColorImage {
+    let mut frame = ColorImage::new(SIZE.0, SIZE.1);
+    frame.rgb.fill(value);
+    frame
+}
+
 /// Sends frames, each after the members have processed the previous one.
 fn write_frames(switch: &mut Tee, numbers: std::ops::Range<u8>) {
     let frames = |count: &Counter<OutputCounts>| count().frames + count().lost;
     for number in numbers {
         switch.handle_requests();
-        let counts: Vec<_> = switch.outputs.iter().map(|(_, output)| output.create_counter()).collect();
+        let counts: Vec<_> = switch.outputs.iter().map(|member| member.output.create_counter()).collect();
         let before: Vec<_> = counts.iter().map(frames).collect();
-        let mut frame = ColorImage::new(2, 2);
-        frame.rgb.fill(number);
-        assert!(switch.write_frame(&frame, number.into()).unwrap().is_continue());
+        assert!(switch.write_frame(&filled(number), number.into()).unwrap().is_continue());
         let began = Instant::now();
-        let is_busy = |at: usize| frames(&counts[at]) == before[at] && !switch.outputs[at].1.has_ended();
+        let is_busy = |at: usize| frames(&counts[at]) == before[at] && !switch.outputs[at].output.has_ended();
         while (0..counts.len()).any(is_busy) {
             assert!(began.elapsed() < HANG);
             thread::sleep(Duration::from_millis(1));
@@ -118,11 +125,11 @@ fn members_come_and_go_and_each_gets_the_frames_of_its_time() {
     write_frames(&mut switch, 0..2);
     let (early, late) = (Fake::default(), Fake::default());
     let got = [Arc::clone(&early.got), Arc::clone(&late.got)];
-    control.add("early", Box::new(early)).unwrap();
+    control.add("early", 0, SIZE, Box::new(early)).unwrap();
     write_frames(&mut switch, 2..4);
     assert!(switch.has_outputs());
     let other = control.clone();
-    thread::spawn(move || other.add("late", Box::new(late)).unwrap()).join().unwrap();
+    thread::spawn(move || other.add("late", 0, SIZE, Box::new(late)).unwrap()).join().unwrap();
     write_frames(&mut switch, 4..5);
     control.remove("early");
     control.remove("nobody");
@@ -138,9 +145,9 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
     let (mut switch, control, told) = switch();
     let good = Fake::default();
     let got = Arc::clone(&good.got);
-    control.add("a", Box::new(Fake { name: "a", fails_at: Some(1), ..Fake::default() })).unwrap();
-    control.add("b", Box::new(good)).unwrap();
-    control.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
+    control.add("a", 0, SIZE, Box::new(Fake { name: "a", fails_at: Some(1), ..Fake::default() })).unwrap();
+    control.add("b", 0, SIZE, Box::new(good)).unwrap();
+    control.add("c", 0, SIZE, Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
     write_frames(&mut switch, 0..5);
     switch.handle_requests();
     assert_eq!(switch.outputs.len(), 1);
@@ -155,7 +162,7 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
 fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
     let (mut switch, control, told) = switch();
     let (complete, finish_at) = mpsc::channel();
-    control.add("slow", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
+    control.add("slow", 0, SIZE, Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
     write_frames(&mut switch, 0..1);
     control.remove("slow");
     write_frames(&mut switch, 1..100);
@@ -172,10 +179,10 @@ fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
 #[test]
 fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     let (mut switch, control, told) = switch();
-    control.add("a", Box::new(Fake { name: "a", finish_panics: true, ..Fake::default() })).unwrap();
-    control.add("b", Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
+    control.add("a", 0, SIZE, Box::new(Fake { name: "a", finish_panics: true, ..Fake::default() })).unwrap();
+    control.add("b", 0, SIZE, Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
     let (complete, finish_at) = mpsc::channel();
-    control.add("c", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
+    control.add("c", 0, SIZE, Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
     write_frames(&mut switch, 0..2);
     // After the others have failed, most likely.
     thread::spawn(move || {
@@ -190,16 +197,16 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     ];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
     // A late request is refused, and reported as failed.
-    assert_eq!(control.add("d", Box::new(Fake::default())), Err(RunEnded));
+    assert_eq!(control.add("d", 0, SIZE, Box::new(Fake::default())), Err(RunEnded));
     assert_eq!(all(&told), [failed("d", 0, "it was given up")]);
 }
 
 #[test]
 fn what_was_recorded_is_completed_though_the_run_fails() {
     let (mut switch, control, told) = switch();
-    control.add("a", Box::new(Fake::default())).unwrap();
+    control.add("a", 0, SIZE, Box::new(Fake::default())).unwrap();
     write_frames(&mut switch, 0..3);
-    control.add("b", Box::new(Fake::default())).unwrap();
+    control.add("b", 0, SIZE, Box::new(Fake::default())).unwrap();
     drop(switch);
     assert_eq!(all(&told), [began("a"), completed("a", 3), began("b"), completed("b", 0)]);
 }
@@ -208,7 +215,7 @@ fn what_was_recorded_is_completed_though_the_run_fails() {
 fn a_name_that_is_taken_goes_to_the_newer_member() {
     let (mut switch, control, told) = switch();
     for _ in 0..2 {
-        control.add("a", Box::new(Fake::default())).unwrap();
+        control.add("a", 0, SIZE, Box::new(Fake::default())).unwrap();
         write_frames(&mut switch, 0..2);
     }
     assert_eq!(switch.outputs.len(), 1);
@@ -223,10 +230,10 @@ fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due()
     assert_eq!(switch.repeat_interval(), Some(TICK));
     let live = Fake { repeat_interval: Some(Duration::from_millis(5)), ..Fake::default() };
     let (repeats, file) = (Arc::clone(&live.repeats), Fake::default());
-    control.add("file", Box::new(file)).unwrap();
+    control.add("file", 0, SIZE, Box::new(file)).unwrap();
     assert_eq!(switch.repeat_frame().unwrap(), ControlFlow::Continue(false));
     assert_eq!(all(&told), [began("file")]);
-    control.add("live", Box::new(live)).unwrap();
+    control.add("live", 0, SIZE, Box::new(live)).unwrap();
     write_frames(&mut switch, 0..1);
     let began_at = Instant::now();
     while repeats.load(Ordering::SeqCst) < 4 {
@@ -237,6 +244,32 @@ fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due()
     assert_eq!(switch.repeat_frame().unwrap(), ControlFlow::Continue(false));
     switch.finish(Ending::Complete).unwrap();
     assert_eq!(all(&told), [completed("file", 1), began("live"), completed("live", 1)]);
+}
+
+#[test]
+fn a_member_keeps_its_size_and_shows_the_card_while_frames_are_withheld() {
+    let (mut switch, control, _) = switch();
+    let (film, camera) = (Fake::default(), Fake::default());
+    let (in_film, in_camera) = (Arc::clone(&film.got), Arc::clone(&camera.got));
+    // The fake's first byte is the left edge: black beside a picture that is scaled into a wide frame.
+    control.add("film", 1, (6, 2), Box::new(film)).unwrap();
+    control.add("camera", 2, SIZE, Box::new(camera)).unwrap();
+    write_frames(&mut switch, 1..3);
+    control.withhold("camera", Some(filled(99)));
+    control.withhold("nobody", None);
+    switch.handle_requests();
+    let began = Instant::now();
+    while in_camera.lock().unwrap().last() != Some(&99) {
+        assert!(began.elapsed() < HANG, "the card comes without a frame");
+    }
+    for number in 3..6 {
+        assert!(switch.write_frame(&filled(number), number.into()).unwrap().is_continue());
+    }
+    control.withhold("camera", None);
+    assert!(switch.write_frame(&filled(6), 6).unwrap().is_continue());
+    switch.finish(Ending::Complete).unwrap();
+    assert_eq!(*in_camera.lock().unwrap(), [1, 2, 99, 6]);
+    assert!(in_film.lock().unwrap().iter().all(|&left| left == 0));
 }
 
 /// A stalled recording delays neither the camera nor the frames, and counts its losses.
@@ -251,12 +284,10 @@ fn no_member_waits_for_another() {
     let (stuck, held) = (Arc::clone(&stalled.got), stalled.got.lock().unwrap().clone());
     assert!(held.is_empty());
     let hold = stuck.lock().unwrap();
-    control.add("stalled", Box::new(stalled)).unwrap();
-    control.add("camera", Box::new(Fake { finish_at: Some(finish_at), ..camera })).unwrap();
+    control.add("stalled", 0, SIZE, Box::new(stalled)).unwrap();
+    control.add("camera", 0, SIZE, Box::new(Fake { finish_at: Some(finish_at), ..camera })).unwrap();
     for number in 0..20 {
-        let mut frame = ColorImage::new(2, 2);
-        frame.rgb.fill(number);
-        assert!(switch.write_frame(&frame, number.into()).unwrap().is_continue());
+        assert!(switch.write_frame(&filled(number), number.into()).unwrap().is_continue());
         let began = Instant::now();
         while got.lock().unwrap().last() != Some(&number) {
             assert!(began.elapsed() < HANG, "the camera waits");

@@ -36,7 +36,7 @@ use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
-use bokehcam::pipeline::{self, BlurSetup, Pace, PipelineError, Run};
+use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, PipelineError, Run};
 use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
 use bokehcam::source::{self, DepthChoice, DepthOrigin, Source, SourceName};
 use bokehcam::stats::Report;
@@ -303,7 +303,7 @@ fn run_stream(
     let shared_state = (watchers, shutter, Arc::clone(&stats));
     let server = command.serve_control(claim, &opened, shared_state, looks, global.config.as_deref())?;
     let pace = opened.pace;
-    let run = opened.source.into_run(blurring, Box::new(sink), &stop);
+    let run = opened.source.into_run(blurring, Destination::Owned(Box::new(sink)), &stop);
     let ended = pipeline::run(Run {
         threads: computing.thread_count(),
         changes: run.changes.filter(|_| server.is_some()),

@@ -10,10 +10,18 @@ mod camera;
 mod delay;
 #[cfg(feature = "camera")]
 mod filter;
+#[cfg(feature = "window")]
+#[path = "../../../../tests/common/heard.rs"]
+mod heard;
+#[cfg(feature = "window")]
+mod preview;
 #[path = "../common/program.rs"]
 mod program;
 mod readers;
 mod session;
 #[cfg(feature = "camera")]
 mod source;
+#[cfg(feature = "window")]
+#[path = "../../../../tests/common/store.rs"]
+mod store;
 mod without;

@@ -28,7 +28,7 @@ use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::recorded::RecordedDepth;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
-use bokehcam::pipeline::{self, BlurSetup, Pace, Run};
+use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, Run};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::stats::Report;
 use clap::Parser;
@@ -189,7 +189,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     let stop = AtomicBool::new(false);
     let depth = Box::new(RecordedDepth::new(Arc::clone(&recording), &name)?);
     let camera = Box::new(LoopedCamera::new(recording, &name, frames, clock.clone(), stamps.clone()));
-    let sink = Box::new(StampingSink::new(clock.clone(), stamps.clone()));
+    let sink = Destination::Owned(Box::new(StampingSink::new(clock.clone(), stamps.clone())));
     let report = pipeline::run(Run {
         measured: true,
         changes: None,

@@ -44,9 +44,10 @@ impl Badges {
         if state.is_transitional && !is_late {
             ctx.request_repaint_after(Duration::from_secs_f64(MIN_SHOWN_S));
         }
+        let camera = if state.is_watched { "In a call" } else { "For calls, nobody watches" };
         let all = [
             (recording.map(sized), ACTIVE_COLOR),
-            (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), ACTIVE_COLOR),
+            (text(camera, state.virtual_camera().is_some(), &mut self.camera_s), ACTIVE_COLOR),
             (state.off.then(|| tr("Off: a still card is shown").to_owned()), OVERLAY_COLOR),
             (freeze_text(state).map(|text| tr(text).to_owned()), OVERLAY_COLOR),
             (is_late.then(|| tr("Working…").to_owned()), OVERLAY_COLOR),

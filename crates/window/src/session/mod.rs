@@ -2,17 +2,19 @@
 //! and stops outputs, without blocking the window.
 
 mod held;
+mod outputs;
 mod pipeline_run;
 mod worker;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{self, SyncSender};
-use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 pub use held::Still;
+use outputs::Outputs;
 use worker::SessionWorker;
 
 use super::services::{CliOption, Services};
@@ -58,13 +60,7 @@ pub struct SessionConfig {
     pub demand: Demand,
     /// Whether outputs get the still card instead of the picture.
     pub off: Arc<AtomicBool>,
-    /// Handle of the current run's outputs, to switch that.
-    pub shutter: CurrentShutter,
 }
-
-/// The current run's switch that withholds pictures from the outputs. Set when a run begins; remote control locks it,
-/// too.
-pub type CurrentShutter = Arc<Mutex<Option<ShutterControl>>>;
 
 /// Events from a session to the window.
 pub enum SessionEvent {
@@ -108,8 +104,7 @@ enum Command {
     HoldFrame(Box<Still>, bool),
     ReleaseFrame,
     CopyText(Vec<CliOption>),
-    /// An event of an output of the run with this number.
-    OutputEvent(u64, MemberEvent),
+    OutputEvent(MemberEvent),
     /// The run with this number ended.
     RunEnded(u64, Box<Result<Report, PipelineError>>),
     Close,
@@ -119,6 +114,7 @@ enum Command {
 pub struct Session {
     commands: mpsc::Sender<Command>,
     events: mpsc::Receiver<SessionEvent>,
+    shutter: ShutterControl,
     thread: JoinHandle<SessionOutcome>,
 }
 
@@ -126,15 +122,23 @@ impl Session {
     /// Starts the thread, which opens the source immediately.
     ///
     /// # Errors
-    /// Fails if the thread cannot be created.
+    /// Fails if a thread cannot be created.
     pub fn start(config: SessionConfig, wake: Wake) -> std::io::Result<Self> {
         let (commands, inbox) = mpsc::channel();
         let (sender, events) = mpsc::channel();
-        let own_commands = commands.clone();
-        let thread = thread::Builder::new()
-            .name("session".into())
-            .spawn(move || SessionWorker::new(config, EventSender { sender, wake }, own_commands).run(&inbox))?;
-        Ok(Self { commands, events, thread })
+        let (own_commands, to_worker) = (commands.clone(), commands.clone());
+        // Fails only if the session has ended.
+        let on_output_event = move |event| drop(to_worker.send(Command::OutputEvent(event)));
+        let (outputs, shutter) = Outputs::new(&config, on_output_event)?;
+        let thread = thread::Builder::new().name("session".into()).spawn(move || {
+            SessionWorker::new(config, outputs, EventSender { sender, wake }, own_commands).run(&inbox)
+        })?;
+        Ok(Self { commands, events, shutter, thread })
+    }
+
+    /// Returns the switch that withholds pictures from the outputs.
+    pub fn shutter(&self) -> ShutterControl {
+        self.shutter.clone()
     }
 
     /// Sends a request; ignored if the session has ended.

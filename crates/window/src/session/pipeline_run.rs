@@ -1,33 +1,28 @@
 //! One run of the pipeline.
 
 use std::str::FromStr;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::super::services::{OpenedSource, Services};
-use super::super::state::{Output, Running, Source};
+use super::super::state::{Running, Source};
+use super::outputs::Outputs;
 use super::{EventSender, SessionConfig, SessionEvent};
-use bokehcam::clock::Clock;
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
 use bokehcam::look::{Look, SourceDepth};
-use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Pace, PipelineError, Run};
-use bokehcam::sink::Sink;
-use bokehcam::sink::tee_control::MemberEvent;
-use bokehcam::sink::{Shutter, Tee, TeeControl};
+use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Destination, Pace, PipelineError, Run};
 use bokehcam::source::{Kind, SourceName};
 use bokehcam::stats::Report;
 
 /// A running pipeline, and the handles that control it.
 pub(super) struct PipelineRun {
-    pub size: (u32, u32),
-    pub period_ns: u64,
+    size: (u32, u32),
     source_depth: SourceDepth,
     changes: ChangeSender,
-    tee_control: TeeControl,
-    pub stop: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
     /// Progress of the background plate, if depth comes from it.
     pub guide: Option<Arc<Guide>>,
     thread: JoinHandle<Option<Report>>,
@@ -37,7 +32,7 @@ pub(super) struct PipelineRun {
 const ADAPTIVE_QUALITY: bool = true;
 
 impl PipelineRun {
-    /// Starts a run. `on_output_event` is called with events of its outputs, `ended` once with the run's result.
+    /// Starts a run into these outputs. `ended` is called once with its result.
     ///
     /// # Errors
     /// Returns a one-line message if the executor or the thread cannot be created.
@@ -45,7 +40,7 @@ impl PipelineRun {
         opened: OpenedSource,
         config: &mut SessionConfig,
         events: &EventSender,
-        on_output_event: impl Fn(MemberEvent) + Send + Sync + 'static,
+        outputs: &mut Outputs,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
         let OpenedSource { name, source, has_depth, depth_methods, depth_method, camera, .. } = opened;
@@ -59,12 +54,7 @@ impl PipelineRun {
         })?;
         let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let (budget_ns, threads) = (config.budget_ns.unwrap_or(info.period_ns), config.threads);
-        // Outputs can be added and removed during the run; the shutter withholds pictures from all of them.
-        let (tee, tee_control) = Tee::with_control("window", on_output_event);
-        let period = Duration::from_nanos(info.period_ns);
-        let (demand, off) = (config.demand.clone(), Arc::clone(&config.off));
-        let (sink, shutter) = Shutter::new(Box::new(tee), info.size, period, demand, Clock::system(), off);
-        *config.shutter.lock().unwrap_or_else(PoisonError::into_inner) = Some(shutter);
+        let sink = outputs.begin_source(info.size, info.period_ns);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), config.keep_going);
@@ -81,7 +71,7 @@ impl PipelineRun {
                 output_request: Some(output_request),
                 view: Some(view),
                 progress: &|_| wake(),
-                ..source.into_run(blurring, Box::new(sink), &stopped)
+                ..source.into_run(blurring, Destination::Lent(&mut *sink.lock()), &stopped)
             })
         };
         let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
@@ -108,16 +98,7 @@ impl PipelineRun {
             executor,
             budget_ns,
         });
-        let pipeline_run = Self {
-            size: info.size,
-            period_ns: info.period_ns,
-            source_depth,
-            changes,
-            tee_control,
-            stop,
-            guide,
-            thread,
-        };
+        let pipeline_run = Self { size: info.size, source_depth, changes, stop, guide, thread };
         Ok((pipeline_run, source))
     }
 
@@ -138,17 +119,6 @@ impl PipelineRun {
             tracing::debug!("an executor was made in {:?}", began.elapsed());
             Ok(bokeh)
         })
-    }
-
-    /// Adds an output to the run.
-    pub(super) fn add_output(&self, output: &Output, sink: Box<dyn Sink>) {
-        // A run that has ended rejects the sink and reports that through `on_output_event`.
-        let _ = self.tee_control.add(&output.name, sink);
-    }
-
-    /// Removes an output from the run, which completes its file.
-    pub(super) fn remove_output(&self, output: &Output) {
-        self.tee_control.remove(&output.name);
     }
 
     /// Stops the run and waits for it. Returns its report.

@@ -4,29 +4,33 @@ mod looks;
 mod sources;
 
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc;
 
+use super::outputs::Outputs;
 use super::pipeline_run::PipelineRun;
 use super::{Command, EventSender, SessionConfig, SessionEvent, SessionOutcome, held};
 use crate::services::CliOption;
 use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::files::user_folders as folders;
-use bokehcam::link::demand::Watch;
 use bokehcam::look::Look;
 use bokehcam::pipeline::PipelineError;
-use bokehcam::sink::tee_control::{MemberEvent, MemberState};
-use bokehcam::sink::{self, Target};
+use bokehcam::sink;
+use bokehcam::sink::tee_control::MemberEvent;
 use bokehcam::stats::Report;
+
+/// Shown when the virtual camera is switched off while a program reads it.
+const STILL_READ: &str = "Calls see a still card now. The camera goes from their lists once they have let go of it.";
 
 /// State of the session, owned by its thread.
 pub(super) struct SessionWorker {
-    /// Configuration; look, source and outputs are kept current.
+    /// Configuration; look and source are kept current.
     config: SessionConfig,
+    outputs: Outputs,
+    /// Whether a program reads a virtual camera, as reported last.
+    is_watched: bool,
     /// Depth method that the user requested; `None` for the default.
     depth_method: Option<DepthMethod>,
-    /// Held while an output is active, to keep the source from pausing.
-    watch: Option<Watch>,
     events: EventSender,
     commands: mpsc::Sender<Command>,
     pipeline: Option<PipelineRun>,
@@ -35,8 +39,6 @@ pub(super) struct SessionWorker {
     report: Option<Report>,
     /// Message of the first output that failed.
     first_failure: Option<String>,
-    /// Whether a run has ever started.
-    has_started: bool,
     /// Recent looks of the current run with their change numbers, oldest first.
     looks: VecDeque<(u64, Look)>,
     /// The frame held on the screen.
@@ -45,18 +47,18 @@ pub(super) struct SessionWorker {
 
 impl SessionWorker {
     /// Creates a session that has not started yet; `commands` sends to the session itself.
-    pub fn new(config: SessionConfig, events: EventSender, commands: mpsc::Sender<Command>) -> Self {
+    pub fn new(config: SessionConfig, outputs: Outputs, events: EventSender, commands: mpsc::Sender<Command>) -> Self {
         Self {
             config,
+            outputs,
+            is_watched: false,
             depth_method: None,
-            watch: None,
             events,
             commands,
             pipeline: None,
             runs: 0,
             report: None,
             first_failure: None,
-            has_started: false,
             looks: VecDeque::new(),
             held: None,
         }
@@ -89,7 +91,7 @@ impl SessionWorker {
                     Command::HoldFrame(still, is_outdated) => self.hold_frame(*still, is_outdated),
                     Command::ReleaseFrame => self.held = None,
                     Command::CopyText(cli_options) => self.copy_command(&cli_options),
-                    Command::OutputEvent(run, notice) => self.handle_output_event(run, &notice),
+                    Command::OutputEvent(event) => self.handle_output_event(event),
                     Command::RunEnded(run, ended) => self.handle_run_end(run, *ended),
                     Command::Close => return self.close(inbox),
                 }
@@ -101,12 +103,15 @@ impl SessionWorker {
     /// Ends the run, and processes the final events of its outputs.
     fn close(mut self, inbox: &mpsc::Receiver<Command>) -> SessionOutcome {
         self.stop_run();
+        let Self { outputs, events, report, mut first_failure, .. } = self;
+        // Its errors are events as well.
+        let _ = outputs.finish();
         for command in inbox.try_iter() {
-            if let Command::OutputEvent(run, notice) = command {
-                self.handle_output_event(run, &notice);
+            if let Command::OutputEvent(event) = command {
+                first_failure = first_failure.or(events.report_output_event(event));
             }
         }
-        SessionOutcome { report: self.report, output_error: self.first_failure }
+        SessionOutcome { report, output_error: first_failure }
     }
 
     /// Recovers recordings of an earlier preview that was killed.
@@ -139,9 +144,8 @@ impl SessionWorker {
                 self.report_outputs();
             }
             Request::StopOutput(output) => {
-                self.config.outputs.retain(|other| *other != output);
-                if let Some(pipeline) = &self.pipeline {
-                    pipeline.remove_output(&output);
+                if self.outputs.switch_off(&output) {
+                    self.events.note(STILL_READ);
                 }
                 self.report_outputs();
             }
@@ -188,18 +192,24 @@ impl SessionWorker {
     }
 
     fn report_outputs(&mut self) {
-        self.config.output_request.set_needed_in_memory(!self.config.outputs.is_empty());
-        self.watch = (!self.config.outputs.is_empty()).then(|| self.config.demand.watch());
-        self.events.send_update(Update::Outputs(self.config.outputs.clone()));
+        let outputs = self.outputs.list();
+        self.config.output_request.set_needed_in_memory(!outputs.is_empty());
+        self.events.send_update(Update::Outputs(outputs));
+        self.report_readers();
     }
 
-    /// Reports that no source is running; `source` has the reason. Recordings end; a virtual camera continues with the
-    /// next source.
-    fn report_no_source(&mut self, source: Source) {
-        // Before the first run, recordings requested at the start still wait for a source.
-        if self.has_started {
-            self.config.outputs.retain(|output| output.is_camera);
+    /// Reports whether a program reads a virtual camera, if that has changed.
+    fn report_readers(&mut self) {
+        let is_watched = self.outputs.is_watched();
+        if std::mem::replace(&mut self.is_watched, is_watched) != is_watched {
+            self.events.send_update(Update::Watched(is_watched));
         }
+    }
+
+    /// Reports that no source is running; `source` has the reason. Recordings end; a virtual camera shows the card until
+    /// the next source.
+    fn report_no_source(&mut self, source: Source) {
+        self.outputs.end_source();
         self.report_outputs();
         self.events.send_update(Update::Source(source));
     }
@@ -217,46 +227,33 @@ impl SessionWorker {
         self.events.send_update(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.events.note(line));
         self.runs += 1;
-        self.config.output_request.set_needed_in_memory(!self.config.outputs.is_empty());
         let (commands, run) = (self.commands.clone(), self.runs);
-        let to_worker = commands.clone();
-        let on_output_event = move |written| {
-            let _ = to_worker.send(Command::OutputEvent(run, written));
-        };
         let ended = move |ended| {
             let _ = commands.send(Command::RunEnded(run, Box::new(ended)));
         };
-        match PipelineRun::start(opened, &mut self.config, &self.events, on_output_event, ended) {
+        match PipelineRun::start(opened, &mut self.config, &self.events, &mut self.outputs, ended) {
             Ok((pipeline, source)) => {
                 self.looks = VecDeque::from([(0, pipeline.adapt_look(&self.config.look))]);
                 self.pipeline = Some(pipeline);
                 self.events.send_update(Update::Source(source));
-                // A recording ends with its source; a virtual camera continues with the next one.
-                let first = !std::mem::replace(&mut self.has_started, true);
-                let outputs = std::mem::take(&mut self.config.outputs);
-                outputs
-                    .into_iter()
-                    .filter(|output| output.is_camera || first)
-                    .for_each(|output| self.add_output(output));
+                // Those of the command line begin with the first source.
+                std::mem::take(&mut self.config.outputs).into_iter().for_each(|output| self.add_output(output));
                 self.report_outputs();
             }
             Err(line) => self.report_no_source(Source::Lost(line)),
         }
     }
 
-    /// Opens an output and adds it to the run; an unnamed recording gets a name.
+    /// Opens an output, or shows pictures again in one that is still read; an unnamed recording gets a name.
     fn add_output(&mut self, mut output: Output) {
-        let Some(pipeline) = &self.pipeline else { return self.events.note("There is no source to record.") };
+        if !output.is_camera && self.pipeline.is_none() {
+            return self.events.note("There is no source to record.");
+        }
         if output.name.is_empty() {
             output.name = self.unused_video_path().display().to_string();
         }
-        match self.config.services.open_output(&output.name, pipeline.size, pipeline.period_ns, &pipeline.stop) {
-            Ok(sink) => {
-                self.config.output_request.set_needed_in_memory(true);
-                pipeline.add_output(&output, sink);
-                self.config.outputs.push(output);
-            }
-            Err(line) => self.events.note(line),
+        if let Err(line) = self.outputs.add(output, &mut *self.config.services) {
+            self.events.note(line);
         }
     }
 
@@ -265,7 +262,7 @@ impl SessionWorker {
         // A file appears under its name only when complete, so check the active outputs as well.
         self.config
             .folders
-            .unused_video_path(|path| self.config.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
+            .unused_video_path(|path| self.outputs.list().iter().any(|output| path.as_os_str() == output.name.as_str()))
     }
 
     /// Copies the equivalent command to the clipboard.
@@ -275,36 +272,20 @@ impl SessionWorker {
             true => output.name.clone(),
             false => self.unused_video_path().display().to_string(),
         };
-        let outputs: Vec<String> = self.config.outputs.iter().map(again).collect();
+        let outputs: Vec<String> = self.outputs.list().iter().map(again).collect();
         let look = self.effective_look();
         let command = self.config.services.format_command(&look, &self.config.source, &outputs, cli_options);
         self.events.note(format!("Copied: {command}"));
         self.events.send(SessionEvent::Copy(command));
     }
 
-    /// Handles an event of an output of the run with number `run`.
-    fn handle_output_event(&mut self, run: u64, MemberEvent { member, state }: &MemberEvent) {
-        match state {
-            MemberState::Started => self.events.note(match virtual_camera_name(member) {
-                Some(camera) => format!("Calls have this picture now: choose the camera {camera}"),
-                None => format!("Recording to {}", folders::format_output(member)),
-            }),
-            // A virtual camera leaves no file to report.
-            MemberState::Completed { .. } if virtual_camera_name(member).is_some() => {}
-            MemberState::Completed { frames } => {
-                self.events.note(format!("Complete: {}, {frames} frames", folders::format_output(member)));
-                self.events.report_saved(Path::new(member));
-            }
-            MemberState::Failed { why, .. } => {
-                tracing::error!("{why}");
-                self.first_failure.get_or_insert_with(|| why.clone());
-                self.events.send_update(Update::OutputFailure(why.clone()));
-                // An output of an earlier run may have the same name as one of the current run.
-                if run == self.runs {
-                    self.config.outputs.retain(|output| output.name != *member);
-                    self.report_outputs();
-                }
-            }
+    /// Handles an event of an output; forgets one that has failed.
+    fn handle_output_event(&mut self, event: MemberEvent) {
+        let number = event.number;
+        if let Some(why) = self.events.report_output_event(event) {
+            self.first_failure.get_or_insert(why);
+            self.outputs.forget(number);
+            self.report_outputs();
         }
     }
 
@@ -327,17 +308,8 @@ impl SessionWorker {
         }
     }
 
-    /// Ends the current run and completes its outputs.
+    /// Ends the current run.
     fn stop_run(&mut self) {
         self.report = self.pipeline.take().and_then(PipelineRun::stop).or_else(|| self.report.take());
     }
-}
-
-/// Returns the name that other programs display for a virtual camera; `None` if the output is no camera.
-fn virtual_camera_name(output: &str) -> Option<String> {
-    let target: Target = output.parse().ok().filter(Target::is_camera)?;
-    Some(match target {
-        Target::PipeWire(label) => label.unwrap_or_else(|| "bokehcam".to_owned()),
-        other => other.to_string(),
-    })
 }

@@ -176,6 +176,8 @@ pub enum Update {
     Background(Background),
     /// Active outputs: sent after each start or stop, including failed ones.
     Outputs(Vec<Output>),
+    /// Whether a program reads the virtual camera.
+    Watched(bool),
     /// Bytes of the recording so far.
     RecordedBytes(u64),
     /// A file was saved in this folder.

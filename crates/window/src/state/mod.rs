@@ -123,6 +123,8 @@ pub struct State {
     chosen_preset: Option<String>,
     /// Active outputs besides the window.
     pub outputs: Vec<Output>,
+    /// Whether a program reads the virtual camera.
+    pub is_watched: bool,
     /// Whether the self-timer is counting down to a snapshot.
     pub self_timer: bool,
     /// Location of the last saved file.

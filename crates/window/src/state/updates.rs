@@ -25,6 +25,7 @@ impl State {
                 // Without outputs there is nothing to confirm any more.
                 self.closing &= !self.outputs.is_empty();
             }
+            Update::Watched(is_watched) => self.is_watched = is_watched,
             Update::RecordedBytes(bytes) => self.recorded_bytes = Some(bytes),
             Update::SavedIn(folder) => self.saved_in = Some(folder),
             Update::Note(text) => self.note(text),

@@ -23,6 +23,7 @@ use std::sync::atomic::Ordering;
 use bokehcam::depth::plate::Step;
 use bokehcam::files::user_folders::is_recording_name;
 use bokehcam::frame::DepthMap;
+use bokehcam::link::demand::Demand;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
 use bokehcam_window::state::{Output, Request, Source, Update};
@@ -127,15 +128,85 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     watched.session.send(Request::StopOutput(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
-    // A recording ends with its source, and a virtual camera continues with the next one.
+    // A virtual camera and a recording go on with the next source.
+    watched.session.send(Request::StartOutput(output("take", false)));
+    until("it is written", PATIENCE, || has(&watched, "take 32"));
     watched.session.send(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
-    watched.until("one", |told| *told == Update::Outputs(vec![output("camera", true)]));
     until("the camera goes on", PATIENCE, || has(&watched, "camera 48"));
     let written = Arc::clone(&watched.services.written);
+    let opened = written.lock().unwrap().iter().filter(|line| line.ends_with("opened")).count();
+    assert_eq!(opened, 3, "each was opened once");
+    assert!(!has(&watched, "take 48") && !has(&watched, "take complete"), "a recording keeps its size");
+    // Without a source, a recording ends, and a virtual camera shows the card.
+    let cards = written.lock().unwrap().iter().filter(|line| *line == "camera card").count();
+    watched.session.send(Request::Open("nothing".into()));
+    until("the card", PATIENCE, || {
+        written.lock().unwrap().iter().filter(|line| *line == "camera card").count() > cards
+    });
+    until("the recording is complete", PATIENCE, || has(&watched, "take complete"));
+    assert!(!has(&watched, "camera complete"));
     watched.heard.session.close().report.unwrap();
-    let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
-    assert_eq!(complete, 2, "once for each source");
+    assert_eq!(written.lock().unwrap().iter().filter(|line| *line == "camera complete").count(), 1);
+}
+
+/// Whatever the source does, a call sees pictures or the card without an end, in time.
+#[test]
+fn a_call_goes_on_through_thirty_changes_of_source_and_depth() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.session.send(Request::StartOutput(Output { name: "camera".into(), is_camera: true }));
+    watched.until("it is there", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));
+    let reader = watched.services.readers.lock().unwrap().as_ref().map(Demand::watch);
+    watched.until("a call", |told| *told == Update::Watched(true));
+    let written = Arc::clone(&watched.services.written);
+    for round in 0..30 {
+        let request = match round % 3 {
+            0 => Request::Open("48".into()),
+            1 => Request::CapturePlate,
+            _ => Request::Open("32".into()),
+        };
+        let width = if round % 3 == 2 { 32 } else { 48 };
+        let before = written.lock().unwrap().len();
+        watched.session.send(request);
+        watched.until("it runs", |told| is_running(told, width));
+        until("pictures of it", PATIENCE, || {
+            written.lock().unwrap()[before..].iter().any(|line| *line == format!("camera {width}"))
+        });
+    }
+    drop(reader);
+    watched.until("no call", |told| *told == Update::Watched(false));
+    let told = written.lock().unwrap().clone();
+    assert_eq!(told.iter().filter(|line| line.ends_with("opened")).count(), 1);
+    assert!(!told.iter().any(|line| line.ends_with("complete")));
+    assert!(watched.heard.session.close().report.unwrap().frames.is_balanced());
+}
+
+#[test]
+fn a_camera_switched_off_in_a_call_shows_the_card_until_the_call_lets_go_of_it() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    let camera = || Output { name: "camera".into(), is_camera: true };
+    let written = Arc::clone(&watched.services.written);
+    let last = || written.lock().unwrap().last().cloned().unwrap_or_default();
+    watched.session.send(Request::StartOutput(camera()));
+    until("pictures", PATIENCE, || last() == "camera 32");
+    let reader = watched.services.readers.lock().unwrap().as_ref().map(Demand::watch);
+    watched.session.send(Request::StopOutput(camera()));
+    watched.until("it is off", |told| *told == Update::Outputs(Vec::new()));
+    until("the card", PATIENCE, || last() == "camera card");
+    watched.frame("frames go on", |_| true);
+    assert_eq!(last(), "camera card");
+    watched.session.send(Request::StartOutput(camera()));
+    watched.until("it is on", |told| *told == Update::Outputs(vec![camera()]));
+    until("pictures again", PATIENCE, || last() == "camera 32");
+    watched.session.send(Request::StopOutput(camera()));
+    until("the card again", PATIENCE, || last() == "camera card");
+    drop(reader);
+    until("it is gone", PATIENCE, || last() == "camera complete");
+    let opened = written.lock().unwrap().iter().filter(|line| line.ends_with("opened")).count();
+    assert_eq!(opened, 1, "the call kept its camera");
+    watched.heard.session.close();
 }
 
 #[test]

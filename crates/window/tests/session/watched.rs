@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bokehcam::bokeh::{self, Bokeh};
@@ -11,10 +11,11 @@ use bokehcam::capture::synthetic::Format;
 use bokehcam::capture::{Camera as Capture, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
+use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::sink::{self, Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 use bokehcam_lab::synthetic::Synthetic;
 use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
@@ -28,28 +29,42 @@ use super::store::NoStore;
 struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
+    readers: Arc<Mutex<Option<Demand>>>,
     settings: NoStore,
 }
 
-struct Film(Arc<Mutex<Vec<String>>>, String);
+/// An output that notes the width of its pictures; `camera` is a virtual camera.
+struct Film {
+    written: Arc<Mutex<Vec<String>>>,
+    name: String,
+    last_ns: Option<u64>,
+}
 
 impl Sink for Film {
-    fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        if self.1 == "fills up" {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        if self.name == "fills up" {
             return Err(SinkError::Exists { path: "the disk is full now".into() });
         }
-        self.0.lock().unwrap().push(format!("{} {}", self.1, frame.width));
+        assert!(self.last_ns.replace(time_ns).is_none_or(|last_ns| last_ns < time_ns), "time goes on");
+        self.written.lock().unwrap().push(format!("{} {}", self.name, frame.width));
         Ok(ControlFlow::Continue(()))
     }
+    fn write_card(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.written.lock().unwrap().push(format!("{} card", self.name));
+        Ok(ControlFlow::Continue(()))
+    }
+    fn is_live(&self) -> bool {
+        self.name == "camera"
+    }
     fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        if self.1 == "no end" {
+        if self.name == "no end" {
             return Err(SinkError::Exists { path: "the disk is full at the end".into() });
         }
-        self.0.lock().unwrap().push(format!("{} complete", self.1));
+        self.written.lock().unwrap().push(format!("{} complete", self.name));
         Ok(())
     }
     fn describe(&self) -> String {
-        self.1.clone()
+        self.name.clone()
     }
 }
 
@@ -106,12 +121,13 @@ impl Services for Small {
         self.executors.fetch_add(1, Ordering::SeqCst);
         bokeh::create_blur(settings, size, None, Some(1)).map_err(|error| error.to_string())
     }
-    fn open_output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
+    fn open_output(&mut self, name: &str, options: sink::Options) -> Result<Box<dyn Sink>, String> {
         if name == "full" {
-            Err("the disk is full".into())
-        } else {
-            Ok(Box::new(Film(Arc::clone(&self.written), name.into())))
+            return Err("the disk is full".into());
         }
+        self.written.lock().unwrap().push(format!("{name} opened"));
+        *self.readers.lock().unwrap() = options.demand;
+        Ok(Box::new(Film { written: Arc::clone(&self.written), name: name.into(), last_ns: None }))
     }
     fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
         self.settings.format_command(look, source, outputs, switches)
@@ -125,6 +141,8 @@ impl Services for Small {
 pub struct FrameInput {
     pub executors: Arc<AtomicUsize>,
     pub written: Arc<Mutex<Vec<String>>>,
+    /// The demand of the output that was opened last.
+    pub readers: Arc<Mutex<Option<Demand>>>,
 }
 
 /// A session on them.
@@ -136,8 +154,13 @@ impl Watched {
     }
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
-        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoStore };
-        let services = FrameInput { executors: Arc::clone(&small.executors), written: Arc::clone(&small.written) };
+        let (executors, written, readers) = (Arc::default(), Arc::default(), Arc::default());
+        let services = FrameInput {
+            executors: Arc::clone(&executors),
+            written: Arc::clone(&written),
+            readers: Arc::clone(&readers),
+        };
+        let small = Small { executors, written, readers, settings: NoStore };
         Self { heard: Heard::begin(Box::new(small), source, folder), services }
     }
 }

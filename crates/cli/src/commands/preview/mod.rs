@@ -178,7 +178,6 @@ pub fn show_source(
             output_request: Arc::default(),
             demand: Demand::default(),
             off: Arc::default(),
-            shutter: Arc::default(),
             folders: window.save_to.clone().map_or_else(Folders::from_user_dirs, Folders::single),
         },
         theme: window.theme,

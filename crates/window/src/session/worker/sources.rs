@@ -10,17 +10,19 @@ use crate::state::{Request, Update};
 use bokehcam::files::atomic_file;
 use bokehcam::look::BackgroundSetting;
 
-/// Interval of checks for new devices and of the recording's size.
+/// Interval of checks for new devices, for readers of virtual cameras, and of the recording's size.
 const CHECK_PERIOD: Duration = Duration::from_secs(1);
 
 impl SessionWorker {
-    /// Waits for the next command, and meanwhile checks for device changes. `None` if all senders are gone.
+    /// Waits for the next command, and meanwhile checks for changes of devices and readers. `None` if all senders are gone.
     pub(super) fn next_command(&mut self, inbox: &mpsc::Receiver<Command>) -> Option<Command> {
         loop {
             match inbox.recv_timeout(CHECK_PERIOD) {
                 Ok(command) => return Some(command),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
                     self.report_recording_size();
+                    self.outputs.remove_unread();
+                    self.report_readers();
                     self.check_devices();
                 }
                 Err(mpsc::RecvTimeoutError::Disconnected) => return None,
@@ -30,7 +32,7 @@ impl SessionWorker {
 
     /// Reports the current size of the recording.
     fn report_recording_size(&self) {
-        let recording = self.config.outputs.iter().find(|output| !output.is_camera);
+        let recording = self.outputs.list().into_iter().find(|output| !output.is_camera);
         let bytes = recording.and_then(|output| atomic_file::bytes_written(output.name.as_ref()));
         bytes.into_iter().for_each(|bytes| self.events.send_update(Update::RecordedBytes(bytes)));
     }

@@ -1,16 +1,16 @@
 //! Remote control of the window: its requests run on the window's thread, like user actions.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 
 use super::App;
 use crate::remote_changes::RemoteChanges;
-use crate::session::{CurrentShutter, SnapshotRequest};
+use crate::session::SnapshotRequest;
 use crate::state::{Action, DepthMethod, Running, Source};
 use crate::window::{RemoteConfig, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
@@ -29,7 +29,7 @@ type Task = Box<dyn FnOnce(&mut App, &ActiveEventLoop) + Send>;
 struct RemoteHandle {
     tasks: Sender<Task>,
     proxy: EventLoopProxy<UserEvent>,
-    shutter: CurrentShutter,
+    shutter: ShutterControl,
 }
 
 /// The control server, and its state on the window's side.
@@ -46,7 +46,7 @@ pub(super) struct RemoteControl {
 impl RemoteControl {
     pub fn start(
         RemoteConfig { claim, rules }: RemoteConfig,
-        shutter: CurrentShutter,
+        shutter: ShutterControl,
         proxy: &EventLoopProxy<UserEvent>,
     ) -> std::io::Result<Self> {
         let (to, tasks) = mpsc::channel();
@@ -96,7 +96,7 @@ impl ControllableRun for RemoteHandle {
     }
 
     fn shutter(&self) -> Option<ShutterControl> {
-        self.shutter.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        Some(self.shutter.clone())
     }
 
     fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
@@ -208,7 +208,7 @@ impl App {
             size,
             depth: state.depth_method().map(|depth_method| depth_method.to_string()),
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
-            watched: Some(self.demand.has_watchers()),
+            watched: Some(state.is_watched),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
             fps: if is_moving { state.meters.summary().fps } else { 0.0 },
             look: Patch::describe(&state.look),

@@ -117,11 +117,12 @@ impl App {
                 let _ = to_wake.send_event(UserEvent::Session);
             }
         });
-        let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
-        let start = |control| control::RemoteControl::start(control, Arc::clone(&session.shutter), &proxy);
-        let remote_control = control.map(start).transpose()?;
         let off = Arc::clone(&session.off);
         let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
+        let session = Session::start(session, wake)?;
+        let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
+        let start = |control| control::RemoteControl::start(control, session.shutter(), &proxy);
+        let remote_control = control.map(start).transpose()?;
         let clock = Clock::system();
         state.meters.set_start(clock.now_ns());
         let ctx = egui::Context::default();
@@ -136,7 +137,7 @@ impl App {
             proxy,
             gfx: None,
             device,
-            session: Session::start(session, wake)?,
+            session,
             wake_pending,
             frames: None,
             guide: None,

@@ -10,7 +10,7 @@ use bokehcam::capture::synthetic::Format;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::Look;
 use bokehcam::recording::tum::{Writer, WriterOptions};
-use bokehcam::sink::Sink;
+use bokehcam::sink::{self, Sink};
 use bokehcam::source::devices::Choice;
 use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
@@ -97,14 +97,8 @@ impl Services for Plug {
     fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.system.create_executor(settings, size)
     }
-    fn open_output(
-        &mut self,
-        name: &str,
-        size: (u32, u32),
-        ns: u64,
-        stop: &Arc<AtomicBool>,
-    ) -> Result<Box<dyn Sink>, String> {
-        self.system.open_output(name, size, ns, stop)
+    fn open_output(&mut self, name: &str, options: sink::Options) -> Result<Box<dyn Sink>, String> {
+        self.system.open_output(name, options)
     }
     fn format_command(&self, look: &Look, source: &str, outputs: &[String], switches: &[CliOption]) -> String {
         self.system.format_command(look, source, outputs, switches)
