@@ -110,7 +110,7 @@ impl ElementImpl for Imp {
                 "Background blur",
                 "Filter/Effect/Video",
                 "Blurs the background like a lens, with discs and other apertures: by depth, if the pad depth is \
-                 linked, else above and below a sharp band",
+                 linked, else the whole picture evenly",
                 "The bokehcam maintainers",
             )
         });

@@ -21,7 +21,7 @@ pub struct Stream {
     pictures: Option<Pictures>,
     maps: Maps,
     processor: Option<FrameProcessor>,
-    /// Parameters of the stepper: the look, the version of the settings, and whether there is depth.
+    /// Parameters of the processor: the look, the version of the settings, and whether there is depth.
     look: Look,
     version: u64,
     has_depth: bool,
@@ -179,7 +179,7 @@ impl Imp {
         }
     }
 
-    /// Applies changed settings to the stepper, or creates it.
+    /// Applies changed settings to the processor, or creates it.
     fn update_processor(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
         let values = {
             let values = lock(&self.values);
@@ -200,8 +200,8 @@ impl Imp {
                 Some(processor) => processor.set_look(&fitting),
                 None => {
                     if look.effect == Effect::Auto && !has_depth {
-                        const WHY: &str = "without depth, the picture is blurred outside of a sharp band: link a depth \
-                                           map to the pad depth, or set the property effect";
+                        const WHY: &str = "without depth, the whole picture is blurred evenly: link a depth map to the \
+                                           pad depth, or set the property effect";
                         gst::element_imp_info!(self, gst::StreamError::Failed, ("{WHY}"));
                     }
                     let made = FrameProcessor::new(&fitting, size, has_depth, true, values.computing());

@@ -2,7 +2,7 @@
 //!
 //! Alternates `bokehcam stream --to null` and `bokehcam preview` on one recording, each in its own process, and
 //! compares the process's processor time per delivered frame. The windows are on an X server without hardware, as in
-//! `tests/window`.
+//! `crates/cli/tests/window`.
 
 #[path = "../../../lab/benches/common/mod.rs"]
 mod common;
