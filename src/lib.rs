@@ -40,7 +40,8 @@
 //!
 //! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, for shaders
 //! without loop bounding in `compute/device.rs`, in `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`,
-//! under `v4l2`, and in the crate `bokehcam-link`, where each block has its safety argument. `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
+//! under `v4l2`, and in the crate `bokehcam-link`, where each block has its safety argument. `scripts/prove-link`
+//! checks it with loom, Miri and ThreadSanitizer.
 
 #[doc(hidden)]
 pub use bokehcam_link as link;

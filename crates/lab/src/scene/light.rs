@@ -32,7 +32,7 @@ pub struct Ambient {
 pub struct Occluder {
     pub centre: Vec3,
     pub radius: f32,
-    /// The part that it represents; it occludes no light of that part.
+    /// The part that it represents, whose own points it does not occlude.
     pub part: usize,
 }
 
