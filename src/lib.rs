@@ -18,21 +18,21 @@
 //! source, and the low-rank kernels of an aperture.
 //!
 //! Modules by layer: imports go down only, and modules of a layer do not import each other. Hidden modules are not part
-//! of the public interface and may change with every version; `docs/developers.md` describes them.
+//! of the public interface and may change with every version; `docs/developers.md` shows how a frame travels through them.
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 10 | `controller`: commands to a running stream |
+//! | 10 | `controller`: answers requests to a run, by the same code for a stream and a preview |
 //! | 9 | [`source`]: cameras, recordings and their depth, by name |
-//! | 8 | [`pipeline`]: connects all stages |
+//! | 8 | [`pipeline`]: the threads of a run |
 //! | 7 | [`engine`]: colour and depth in, blurred picture out |
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
-//! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link` (the crate `bokehcam-link`), [`budget`], [`network`], [`stats`], [`recording`], [`video`], `v4l2`, `pipewire`, `control` |
-//! | 2 | `compute`, [`calibration`], [`layout`] |
-//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`camera_control`], `files` |
-//! | 0 | `names` |
+//! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`]: the four stages |
+//! | 3 | `link` (the crate `bokehcam-link`), [`budget`] (the governor), [`network`], [`stats`] (the report), [`recording`], [`video`], `v4l2`, `pipewire`, `control` (the socket of `ctl`) |
+//! | 2 | `compute` (thread pool, SIMD, GPU device, free memory), [`calibration`] (and rectification), [`layout`] (of raw pictures) |
+//! | 1 | [`color`] (curves and weights), [`frame`] (pictures and maps), [`optics`] (the lens), [`clock`], [`camera_control`], `files` (atomic writes) |
+//! | 0 | `names`: enumerations whose values have names, help and an order |
 //!
 //! Conventions: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in nanoseconds
