@@ -18,7 +18,7 @@
 //! source, and the low-rank kernels of an aperture.
 //!
 //! Modules by layer: imports go down only, and modules of a layer do not import each other. Hidden modules are not part
-//! of the public interface and may change with every version; `docs/developers.md` shows how a frame travels through them.
+//! of the public interface and may change with every version; `docs/developers.md` follows a frame through them.
 //!
 //! | layer | modules |
 //! |---|---|
@@ -38,10 +38,10 @@
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in nanoseconds
 //! of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, for shaders
-//! without loop bounding in `compute/device.rs`, in `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`,
-//! under `v4l2`, and in the crate `bokehcam-link`, where each block has its safety argument. `scripts/prove-link`
-//! checks it with loom, Miri and ThreadSanitizer.
+//! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, for
+//! shaders without loop bounding in `compute/device.rs`, in `pipewire/buffer.rs`, `pipewire/log.rs`,
+//! `pipewire/session.rs`, under `v4l2`, and in the crate `bokehcam-link`, where each block has its safety argument.
+//! `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
 
 #[doc(hidden)]
 pub use bokehcam_link as link;
