@@ -194,7 +194,7 @@ fn see(browser: impl Fn(&Path, &str) -> Command) {
 }
 
 #[test]
-#[ignore = "needs browsers (tests/pipewire/session)"]
+#[ignore = "needs browsers (crates/cli/tests/pipewire/session)"]
 fn chromium_shows_the_camera_as_it_is() {
     see(|profile, address| {
         let mut chromium = Command::new("chromium");
@@ -214,7 +214,7 @@ fn chromium_shows_the_camera_as_it_is() {
 }
 
 #[test]
-#[ignore = "needs browsers (tests/pipewire/session)"]
+#[ignore = "needs browsers (crates/cli/tests/pipewire/session)"]
 fn firefox_shows_the_camera_as_it_is() {
     see(|profile, address| {
         let settings = [

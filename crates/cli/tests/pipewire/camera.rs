@@ -25,7 +25,7 @@ fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn the_node_is_what_browsers_and_obs_list() {
     folder();
     let player = Player::start("desk-left", &["--to", "pipewire:Desk, left"]);
@@ -70,7 +70,7 @@ fn is_accounted_for(report: &Value, frames: &[Vec<u8>]) {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn readers_get_each_picture_as_it_is_in_order_and_with_its_time() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
@@ -98,7 +98,7 @@ fn readers_get_each_picture_as_it_is_in_order_and_with_its_time() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
     folder();
     let mut sink = PipeWire::open(Some("Ready"), &Options::new(SIZE, 1_000_000_000 / u64::from(FPS))).unwrap();
@@ -125,7 +125,7 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn two_readers_at_once_get_every_picture() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
@@ -145,7 +145,7 @@ fn two_readers_at_once_get_every_picture() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_reader_comes_after_the_session_manager_has_suspended_the_node() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
@@ -156,7 +156,7 @@ fn a_reader_comes_after_the_session_manager_has_suspended_the_node() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_program_of_before_pipewire_reads_by_pw_v4l2() {
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
     let to = folder().join("old.yuv");
@@ -176,7 +176,7 @@ fn a_program_of_before_pipewire_reads_by_pw_v4l2() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn the_camera_outlives_the_daemon() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
@@ -218,7 +218,7 @@ impl Openings {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn off_is_off_for_readers_while_another_output_hangs() {
     folder();
     let place = tempfile::tempdir().unwrap();
@@ -248,7 +248,7 @@ fn off_is_off_for_readers_while_another_output_hangs() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn the_source_is_read_only_while_somebody_watches() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire", "--on-demand"]);

@@ -42,7 +42,7 @@ impl PictureHandler for Stopwatch {
 
 /// The reader process: a program does not read its own camera.
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session), and who starts it"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session), and who starts it"]
 fn the_other_program() {
     let Ok(camera) = std::env::var("CAMERA_TO_TIME") else { return };
     let (to, from) = mpsc::channel();
@@ -84,7 +84,7 @@ impl Other {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_picture_comes_to_the_reader_without_the_next_one() {
     folder();
     let mut sink = PipeWire::open(Some("Timed"), &Options::new(SIZE, PERIOD.as_nanos() as u64)).unwrap();

@@ -1,7 +1,7 @@
 //! PipeWire cameras, with the daemons in a private session, and other programs as readers.
 //!
-//! `scripts/test` runs them if the daemons are installed. By hand: `tests/pipewire/session cargo test --test pipewire
-//! -- --include-ignored --test-threads=1`, with `--skip browsers::` if there are no browsers.
+//! `scripts/test` runs them if the daemons are installed. By hand: `crates/cli/tests/pipewire/session cargo test --test
+//! pipewire -- --include-ignored --test-threads=1`, with `--skip browsers::` if there are no browsers.
 #![cfg(feature = "pipewire")]
 #![allow(missing_docs)]
 

@@ -18,9 +18,12 @@ pub const FPS: u32 = 30;
 /// Number of pictures in the looped recording.
 pub const PICTURES: usize = 40;
 
-/// Returns the folder of the session created by `tests/pipewire/session`.
+/// Returns the folder of the session created by `crates/cli/tests/pipewire/session`.
 pub fn folder() -> PathBuf {
-    assert!(std::env::var_os("PIPEWIRE_TEST_SESSION").is_some(), "not in a session of tests/pipewire/session");
+    assert!(
+        std::env::var_os("PIPEWIRE_TEST_SESSION").is_some(),
+        "not in a session of crates/cli/tests/pipewire/session"
+    );
     PathBuf::from(std::env::var_os("XDG_RUNTIME_DIR").unwrap())
 }
 

@@ -77,7 +77,7 @@ fn is_near(got: [u8; 3], rgb: u32) -> bool {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn every_format_is_read_in_its_colours() {
     let pictures = folder().join("pictures");
     for (format, name) in [
@@ -102,7 +102,7 @@ fn every_format_is_read_in_its_colours() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_camera_is_listed_and_read_at_its_rate() {
     folder();
     let mut camera = Camera::start(RAW, BLUE);
@@ -126,7 +126,7 @@ fn a_camera_is_listed_and_read_at_its_rate() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_camera_that_goes_is_taken_up_again_also_with_another_size() {
     let pictures = folder().join("again");
     let mut camera = Camera::start(RAW, ORANGE);
@@ -147,7 +147,7 @@ fn a_camera_that_goes_is_taken_up_again_also_with_another_size() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_camera_that_is_not_there_and_our_own_cost_one_line() {
     folder();
     let run = Run::start(&["stream", "pipewire:nobody", "--to", "null"]);
@@ -162,7 +162,7 @@ fn a_camera_that_is_not_there_and_our_own_cost_one_line() {
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn pictures_go_from_camera_to_camera_on_demand() {
     folder();
     let mut camera = Camera::start(RAW, BLUE);
