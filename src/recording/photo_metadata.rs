@@ -148,7 +148,7 @@ fn exif_of_orientation(orientation: Orientation) -> Vec<u8> {
 }
 
 /// Unlinks the thumbnail's directory (IFD1) from the chain of EXIF directories, and overwrites the thumbnail with
-/// zeros. Returns `None` if an offset points outside.
+/// zeros. Returns `None` if an offset points outside, or the directory is cut.
 ///
 /// A directory is a count (2 bytes), entries of 12 bytes (tag first, value at byte 8), and the offset of the next one.
 fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
@@ -172,6 +172,7 @@ fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
     // A single directory may lack the offset of the next one.
     let Some(second) = u32_at(exif, next_link).filter(|&second| second != 0) else { return Some(()) };
     let entries = usize::from(u16_at(exif, second)?);
+    exif.get(second + 2..second + 2 + 12 * entries)?;
     let value = |exif: &[u8], tag: u16| {
         let entry = (0..entries).map(|entry| second + 2 + 12 * entry).find(|&at| u16_at(exif, at) == Some(tag))?;
         u32_at(exif, entry + 8)

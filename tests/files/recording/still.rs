@@ -249,7 +249,13 @@ fn profile_and_exif_go_with_the_picture() {
         let camera = |exif: &[u8]| exif.windows(3).any(|part| part == b"CAM");
         assert!(camera(&kept) && !kept.windows(5).any(|part| part == b"THUMB"), "{to}");
         assert_eq!(kept[30..32], [0, 1], "it says that it is upright");
+        assert_eq!(kept[34..38], [0; 4], "nothing leads to the thumbnail's directory");
     }
+    profile[16..20].copy_from_slice(b"GRAY");
+    let grey = bokehcam::recording::PhotoMetadata { icc_profile: Some(profile), ..Default::default() };
+    write_photo(&path("grey.png"), &image, &grey, false).unwrap();
+    let (_, read) = read_photo(&path("grey.png")).unwrap();
+    assert_eq!((read.icc_profile, read.lost_properties.len()), (None, 1), "it does not apply to RGB");
 
     // `lost_properties` names the properties that 8-bit RGB cannot hold.
     let wide = ImageBuffer::<image::Rgba<u16>, _>::from_pixel(2, 2, [1, 2, 3, 4].into());
@@ -261,9 +267,22 @@ fn profile_and_exif_go_with_the_picture() {
 #[test]
 fn exif_that_leads_nowhere_is_left_behind() {
     let whole = exif();
+    let kept = |exif: &[u8]| {
+        let metadata = bokehcam::recording::PhotoMetadata { exif: Some(exif.to_vec()), ..Default::default() };
+        let kept = metadata.without_thumbnail();
+        assert_eq!(kept.lost_properties, if kept.exif.is_some() { &[][..] } else { &["EXIF that is damaged"] });
+        kept.exif
+    };
+    assert!(kept(&whole).is_some());
+    // Up to the offset of the thumbnail's directory, it is a directory like any other.
     for length in 0..whole.len() {
-        let cut = bokehcam::recording::PhotoMetadata { exif: Some(whole[..length].to_vec()), ..Default::default() };
-        let kept = cut.without_thumbnail();
-        assert!(kept.exif.is_none_or(|exif| !exif.windows(5).any(|part| part == b"THUMB")));
+        let expected = (10..38).contains(&length).then(|| whole[..length].to_vec());
+        assert_eq!(kept(&whole[..length]), expected, "{length} bytes");
+    }
+    // The thumbnail is there, and leads elsewhere: its directory, its place, its length.
+    for at in [34, 48, 60] {
+        let mut astray = whole.clone();
+        astray[at] = 0x7F;
+        assert_eq!(kept(&astray), None, "byte {at}");
     }
 }
