@@ -212,3 +212,27 @@ pub fn content_size(plan: &Plan) -> (usize, usize) {
 pub fn is_kept(bin: &Bin) -> bool {
     !bin.near && bin.min_radius_px >= MIN_KEPT_RADIUS_PX
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::look::{Effect, Look};
+
+    #[test]
+    fn content_beside_what_is_never_kept_is_made_anew() {
+        let settings = Look::with_effect(Effect::Blur).blur_settings((512, 256), false).expect("it blurs");
+        let (plan, mut detector) = (Plan::new(&settings, 512, 256), ChangeDetector::new(512, 256));
+        detector.prediction.means.planes.iter_mut().for_each(|plane| plane.fill(100.0));
+        assert!(!detector.detect(&plan, |_, _| false), "the first frame is made anew");
+        for fresh in [0..0, 0..1, 100..200, 300..512] {
+            let is_within = |columns: &Range<usize>| columns.start < fresh.end && fresh.start < columns.end;
+            assert!(detector.detect(&plan, |columns, _| is_within(&columns)));
+            let content = detector.content();
+            for x in (0..512).step_by(content.width_px()) {
+                let columns = x..x + content.width_px();
+                assert_eq!(content.any_changed(columns.clone(), 0..256), is_within(&columns), "{fresh:?} {columns:?}");
+            }
+            assert_eq!(detector.results().kept_fraction(), 1.0, "the result of equal content is the same");
+        }
+    }
+}

@@ -259,47 +259,4 @@ fn create_exactness_detector(look: &Look, postprocess: Postprocess) -> Option<Ex
 }
 
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::recording::still::{read_color, read_depth};
-
-    fn portrait() -> (ColorImage, DepthMap) {
-        let file = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait").join(name);
-        let color = read_color(&file("rgb/000000.png")).unwrap();
-        (color, read_depth(&file("depth/000000.png"), 5000.0, None).unwrap())
-    }
-
-    /// Returns the map of the last of six equal frames, and the report's text on its refinement.
-    fn prepared(refine: Refine, (color, map): (&ColorImage, &DepthMap)) -> (DepthMap, Option<&'static str>) {
-        let look = Look { refine, background_memory: BackgroundMemory::Off, ..Look::default() };
-        let (size, depth) = (color.size(), Origin::Measured);
-        let input = Input { size, frames: None, depth, knows_background: false, playback: Playback::Still, threads: 1 };
-        let mut preprocessor = Preprocessor::new(&look, input);
-        let mut last = map.clone();
-        for frame in 0..6 {
-            last.clone_from(map);
-            preprocessor.compute_coc(&mut last, color, frame * 33_333_333);
-        }
-        (last, preprocessor.refinement_backend())
-    }
-
-    #[test]
-    fn exact_depth_of_a_stream_stays_as_it_is_with_all_that_is_thin() {
-        let (color, map) = portrait();
-        let (auto, said) = prepared(Refine::Auto, (&color, &map));
-        assert!(auto.metres == map.metres && said == Some(EXACT_DEPTH_NOTE), "{said:?}");
-        let (on, said) = prepared(Refine::On, (&color, &map));
-        assert!(on.metres != map.metres && said == Some("cpu"), "where it is asked for it is refined: {said:?}");
-    }
-
-    #[test]
-    fn a_sensors_depth_is_refined_as_it_is_where_that_is_asked_for() {
-        let (color, mut map) = portrait();
-        // Holes, as a sensor has them beside near objects.
-        map.metres.iter_mut().step_by(40).for_each(|metres| *metres = 0.0);
-        let [(auto, said), (on, _)] = [Refine::Auto, Refine::On].map(|refine| prepared(refine, (&color, &map)));
-        assert!(auto.metres == on.metres && said == Some("cpu"), "{said:?}");
-    }
-}
+mod tests;

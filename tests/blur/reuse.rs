@@ -8,7 +8,7 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::{CocField, CocKind};
-use common::{COC_KINDS, DOF, coc, codes_apart, color, depth, settings};
+use common::{COC_KINDS, DOF, coc, codes_apart, color, depth, grain, settings};
 
 const SIZE: (u32, u32) = (512, 256);
 
@@ -174,6 +174,65 @@ fn another_scene_focus_or_nearer_object_is_made_anew() {
         let pair = both.blur(&picture, &map);
         assert!(codes_apart(&pair.kept, &pair.fresh) <= 3 && mean_apart(&pair.kept, &pair.fresh) <= 0.5, "{frame}");
     }
+}
+
+#[test]
+fn a_scene_from_before_an_unsurveyed_frame_is_made_anew() {
+    let mut both = Both::new(CocKind::Depth, 2);
+    let scenes = [scene(200, 0.0, |_, _| 0.0), scene(60, 40.0, |x, _| (x % 7) as f32)];
+    // After two frames in which everything changes, the next one is not surveyed.
+    for (frame, (picture, map)) in scenes.iter().cycle().take(5).enumerate() {
+        let pair = both.blur(picture, map);
+        assert!(pair.fraction == 0.0 && pair.kept == pair.fresh, "{frame}: {}", pair.fraction);
+    }
+    let [(picture, map), _] = &scenes;
+    assert!(both.blur(picture, map).fraction > 0.7, "then it is kept");
+}
+
+#[test]
+fn a_band_of_focus_that_moves_is_made_anew() {
+    let mut both = Both::new(CocKind::Ramp, 2);
+    let (picture, map) = scene(200, 0.0, |_, _| 0.0);
+    let CocField::Ramp(band) = both.field else { unreachable!() };
+    for (offset_px, is_other) in [(128.0, true), (60.0, true), (60.0, false), (128.0, true), (129.0, true)] {
+        both.field = CocField::Ramp(bokehcam::optics::Ramp { offset_px, ..band });
+        let pair = both.blur(&picture, &map);
+        assert!(pair.kept == pair.fresh && (pair.fraction == 0.0) == is_other, "{offset_px}: {}", pair.fraction);
+    }
+}
+
+#[test]
+fn a_near_object_is_fresh_in_every_frame() {
+    let mut both = Both::new(CocKind::Depth, 2);
+    for frame in 0..12 {
+        let (picture, mut map) = scene(300, 0.0, sensor(frame, 6.0));
+        let near = |x: usize, y: usize| x < 140 && y > 110;
+        (0..map.metres.len()).filter(|at| near(at % 512, at / 512)).for_each(|at| map.metres[at] = 0.4);
+        let pair = both.blur(&picture, &map);
+        assert!(frame == 0 || pair.fraction > 0.2, "{frame}: {}", pair.fraction);
+        for y in 160..256 {
+            let inside = y * 512 * 3..(y * 512 + 90) * 3;
+            assert!(pair.kept.rgb[inside.clone()] == pair.fresh.rgb[inside], "{frame}, row {y}");
+        }
+    }
+}
+
+/// A change within tiles leaves their means as they are, so that only age renews it.
+#[test]
+fn what_the_means_of_tiles_do_not_show_is_shown_in_the_end() {
+    const SIDE: u32 = 128;
+    let mut both = Both::with_size(CocKind::Uniform, 2, (SIDE, SIDE));
+    let map = depth(SIDE, SIDE, |_, _| 3.5);
+    let [before, after] = [0, 7].map(|flip| color(SIDE, SIDE, |x, y| [40 + grain(x ^ flip, y) / 2; 3]));
+    both.blur(&before, &map);
+    let next = both.blur(&after, &map);
+    assert!(next.fraction == 1.0 && next.kept != next.fresh, "nothing seems to change: {}", next.fraction);
+    // Twice the greatest age: what is renewed reads content beside it whose turn comes later.
+    let mut shown = ColorImage::default();
+    for _ in 0..2 * 128 {
+        both.keeping.blur(&after, Some(&map), &both.field, &mut shown).expect("a fitting frame");
+    }
+    assert!(shown == next.fresh);
 }
 
 #[test]

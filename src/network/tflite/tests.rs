@@ -1,4 +1,4 @@
-use super::model::{Activation, Model, Operator, OperatorKind, Strides, Tensor as Part};
+use super::model::{Activation, MAX_TOTAL_VALUES, Model, Operator, OperatorKind, Strides, Tensor as Part};
 use super::*;
 
 mod file;
@@ -224,6 +224,19 @@ fn a_file_is_read_and_run() {
     }
     let other = Tensor { shape: vec![1, 4, 2, 3], values };
     assert!(network.run(&[other], &mut outputs).is_err());
+}
+
+#[test]
+fn tensors_that_are_too_large_together_are_refused() {
+    use Value::{Byte, Bytes, Int, Ints, Tables};
+    let read = |count: usize| {
+        let side = (MAX_TOTAL_VALUES / 16) as i32;
+        let tensor = vec![(0, Ints(vec![side])), (1, Byte(0)), (2, Int(0)), (3, Bytes(b"t".to_vec()))];
+        let graph = vec![(0, Tables(vec![tensor; count])), (1, Ints(vec![0])), (2, Ints(vec![0]))];
+        Model::read(&table_file(&[(0, Int(3)), (2, Tables(vec![graph])), (4, Tables(vec![vec![]]))])).map(drop)
+    };
+    assert_eq!(read(16), Ok(()));
+    assert_eq!(read(17), Err(format!("its tensors have more than {MAX_TOTAL_VALUES} values")));
 }
 
 #[test]

@@ -239,6 +239,30 @@ fn a_cut_file_is_played_as_far_as_it_is_whole() {
         &["take.r3d", "copy it again"],
     );
     assert_says(open(&scene, "take.mcap", b"", &Options::default()), &["not an MCAP file"]);
+    // What was not written to its end may go on with zeros.
+    let began = unchunked(&[], false);
+    let zeros = [&began[..], &[0; 900]].concat();
+    let place = format!("something that is no record (at byte {})", began.len());
+    assert_says(open(&scene, "take.mcap", &zeros, &Options::default()), &[&place]);
+    let zeros = [unchunked(&CAMERA, false), vec![0; 900]].concat();
+    assert_eq!(open(&scene, "take.mcap", &zeros, &Options::default()).unwrap().len(), 3);
+}
+
+#[test]
+fn a_compressed_chunk_that_is_not_what_its_record_states_is_left_out() {
+    let scene = Scene::new();
+    for file in [LZ4, ZSTD] {
+        let chunk = file.windows(4).position(|bytes| bytes == b"lz4\x05" || bytes == b"zstd").unwrap();
+        // The record states length and checksum before the name's length and the name.
+        for (at, fault) in [(chunk - 16, "its length is wrong"), (chunk - 8, "its checksum is wrong")] {
+            for change in [1, 0xFF] {
+                let mut other = file.to_vec();
+                other[at] = other[at].wrapping_add(change);
+                let parts = ["no topics", "the chunk at byte 79 is left out", fault];
+                assert_says(open(&scene, "take.mcap", &other, &Options::default()), &parts);
+            }
+        }
+    }
 }
 
 #[test]
