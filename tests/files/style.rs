@@ -10,7 +10,8 @@ const HABITS: [&str; 8] =
 /// Beginnings of names that have a usual one.
 const NAMES: [&str; 2] = ["MOST_", "LEAST_"];
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Collects the source files in a folder.
+pub(super) fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
