@@ -1,10 +1,12 @@
-//! User files: written atomically (whole or not at all), and read within limits.
+//! User files: written atomically (whole or not at all), and read within limits; programs that convert others.
 
 pub mod atomic_file;
 pub mod data;
 pub mod folder;
+pub mod guardian;
 pub mod input;
 pub mod pipe_reader;
 pub mod place;
+pub mod process;
 pub mod trusted;
 pub mod user_folders;

@@ -10,9 +10,9 @@ mod decoder;
 mod encryption;
 mod error;
 mod probe;
-#[doc(hidden)]
-pub mod process;
 
+#[doc(hidden)]
+pub use crate::files::process;
 pub use decoder::{Conversion, Decoded, Decoder, Pixels};
 pub use error::VideoError;
 pub use probe::VideoFile;

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
+use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,7 +40,7 @@ pub struct ProcessEnd {
 }
 
 impl Process {
-    /// Starts a command whose standard error is piped. `stop` is set once the run has to stop.
+    /// Starts a command in a group of its own, whose standard error is piped. `stop` is set once the run has to stop.
     ///
     /// # Errors
     /// The program is missing, or the system refuses the process or its thread.
@@ -56,12 +57,13 @@ impl Process {
         stop: &Arc<AtomicBool>,
         log: impl FnMut(&str) -> Option<String> + Send + 'static,
     ) -> io::Result<Self> {
-        let mut child = command.spawn()?;
+        // Ctrl-C on a terminal signals the whole group, and an encoder must survive until the last frame.
+        let mut child = command.process_group(0).spawn()?;
         let (stderr_sender, stderr) = mpsc::channel();
         // Read continuously: a process that fills the pipe would block, and this program with it.
         let reader = child.stderr.take().map(|stderr| {
             thread::Builder::new()
-                .name("ffmpeg".into())
+                .name("messages".into())
                 .spawn(move || drop(stderr_sender.send(read_last_lines(stderr, log))))
         });
         let process = Self { child, stderr, stop: Arc::clone(stop) };
@@ -78,6 +80,11 @@ impl Process {
         self.child.stdout.take()
     }
 
+    /// Returns the id of its process group.
+    pub fn group(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Creates a watchdog for it.
     pub fn watchdog(&self) -> Watchdog {
         Watchdog { pid: self.child.id(), stop: Arc::clone(&self.stop), cpu_ticks: None, last_active_at: Instant::now() }
@@ -88,12 +95,20 @@ impl Process {
     /// # Errors
     /// The system cannot tell its state.
     pub fn wait(&mut self) -> io::Result<ProcessEnd> {
+        self.wait_at_most(Duration::MAX)
+    }
+
+    /// Does the same, and kills it after `limit` even if it works.
+    ///
+    /// # Errors
+    /// Same as for [`Process::wait`].
+    pub fn wait_at_most(&mut self, limit: Duration) -> io::Result<ProcessEnd> {
         let (started, mut watchdog) = (Instant::now(), self.watchdog());
         let status = loop {
             if let Some(status) = self.child.try_wait()? {
                 break Some(status);
             }
-            if watchdog.is_hung(started.elapsed()) {
+            if watchdog.is_hung(started.elapsed()) || started.elapsed() > limit {
                 return Ok(self.kill_hung());
             }
             thread::sleep(TICK);
@@ -189,7 +204,7 @@ pub fn read_output_within(command: &mut Command, timeout: Duration) -> Option<St
         // The receiver may have timed out.
         let _ = stdout.read_to_end(&mut text).map(|_| output_sender.send(text));
     };
-    thread::Builder::new().name("ffmpeg".into()).spawn(read).ok()?;
+    thread::Builder::new().name("messages".into()).spawn(read).ok()?;
     let output = output.recv_timeout(timeout);
     // Either it has closed its output and is done, or it took too long.
     let _ = child.kill();
