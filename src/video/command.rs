@@ -1,28 +1,46 @@
 //! Command lines of ffmpeg and ffprobe.
 
 use std::ffi::OsString;
-use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::process::read_output_within;
+use crate::files::process::read_output_within;
 
 /// The program that decodes and encodes.
 pub const FFMPEG: &str = "ffmpeg";
 /// The program that describes files.
 pub const FFPROBE: &str = "ffprobe";
 
-/// Builds a command of ffmpeg or ffprobe in a process group of its own, which logs only errors.
+/// The formats that are read, by ffmpeg's names: each holds its pictures itself. Playlists (`hls`, `concat`, `dash`, `sdp`,
+/// `imf`), names of series (`image2`), scripts and devices lead to other files, whatever the name of the file.
+const FORMATS: &str = "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,live_flv,kux,ogg,asf,asf_o,rm,ivr,mxf,gxf,lxf,nut,nuv,nsv,\
+                       wtv,ty,pva,dv,dhav,ivf,obu,av1,av2,h261,h263,h264,hevc,vvc,evc,m4v,vc1,vc1test,cavsvideo,avs2,avs3,\
+                       dirac,dnxhd,mjpeg,mpjpeg,smjpeg,mjpeg_2000,ingenient,yuv4mpegpipe,gif,apng,webp,webp_anim,fits,flic,\
+                       swf,r3d,cine,ser,smush,film_cpk,roq,smk,bink,4xm,idcin,ipmovie,thp,vmd,wc3movie,ea,lmlm4,xmv,mtv,mvi,\
+                       nc,vivo,viv,bmp_pipe,dds_pipe,dpx_pipe,exr_pipe,gif_pipe,j2k_pipe,jpeg_pipe,jpegls_pipe,jpegxl_pipe,\
+                       jpegxl_anim,pam_pipe,pbm_pipe,pcx_pipe,pgm_pipe,png_pipe,ppm_pipe,psd_pipe,qoi_pipe,sgi_pipe,\
+                       tiff_pipe,webp_pipe";
+
+/// What ffmpeg says of another format, after `[NAME @ ADDRESS] `.
+const NOT_LISTED: &str = "Format not on whitelist";
+
+/// Options of an input, so that one local file is read and no other, whatever it contains.
+pub const INPUT_OPTIONS: [&str; 4] = ["-protocol_whitelist", "file", "-format_whitelist", FORMATS];
+
+/// Returns the name of a format that is not read, if that is what one of ffmpeg's lines says.
+pub(super) fn find_unlisted_format(line: &str) -> Option<&str> {
+    line.split_once(NOT_LISTED)?.0.rsplit_once('[')?.1.split_once(" @").map(|(format, _)| format)
+}
+
+/// Builds a command of ffmpeg or ffprobe, which logs only errors.
 pub fn base_command(program: &str) -> Command {
     let mut command = Command::new(program);
     command
         .args(["-hide_banner", "-loglevel", "error"])
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        // Ctrl-C on a terminal signals the whole group, and an encoder must survive until the last frame.
-        .process_group(0);
+        .stderr(Stdio::piped());
     command
 }
 

@@ -9,12 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
-use super::command::{FFMPEG, base_command, file_url, frame_timing_option};
+use super::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 use super::completeness::{Expected, is_cut_gif, is_loss};
-use super::process::{Process, Watchdog};
 use super::{VideoError, VideoFile};
 use crate::color::YcbcrMatrix;
 use crate::files::pipe_reader::{Filled, PipeReader};
+use crate::files::process::{Process, Watchdog};
 use crate::layout::MAX_SIDE_PX;
 
 /// Number of error messages that are kept: the first ones name the cause.
@@ -222,7 +222,8 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
     let mut command = base_command(FFMPEG);
     command
         // The times are messages of level `info`.
-        .args(["-nostdin", "-nostats", "-loglevel", "repeat+level+info", "-protocol_whitelist", "file"])
+        .args(["-nostdin", "-nostats", "-loglevel", "repeat+level+info"])
+        .args(INPUT_OPTIONS)
         .args(["-max_pixels", &(u64::from(MAX_SIDE_PX) * u64::from(MAX_SIDE_PX)).to_string()]);
     if seeks {
         command.args(["-ss", &format!("{:.6}", start_s + file.offset_s)]);

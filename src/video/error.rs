@@ -22,6 +22,17 @@ pub enum VideoError {
     /// ffmpeg does not know the file.
     #[error("{}: ffmpeg cannot read it: {what}; copy or export it again", path.display())]
     Unreadable { path: PathBuf, what: String },
+    /// The file leads to other files, or is of a rare format.
+    #[error(
+        "{}: it is no video but a list of others, or of a format that is not read ({format}); give the video itself, or \
+         convert it: ffmpeg -i IN -c:v libx264 OUT.mp4",
+        path.display()
+    )]
+    Unlisted {
+        path: PathBuf,
+        /// ffmpeg's name of the format.
+        format: String,
+    },
     /// The file has sound only, or a cover picture.
     #[error("{}: there is no video in it, only sound or other data; give another file", path.display())]
     NoVideo { path: PathBuf },

@@ -8,11 +8,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::VideoError;
-use super::command::{FFPROBE, base_command, file_url};
+use super::command::{FFPROBE, INPUT_OPTIONS, base_command, file_url, find_unlisted_format};
 use super::encryption::is_encrypted;
-use super::process::Process;
 use crate::color::YcbcrMatrix;
 use crate::files::input;
+use crate::files::process::Process;
 
 /// Maximum size of ffprobe's answer, which has a few hundred bytes.
 const MAX_ANSWER_BYTES: u64 = 1 << 16;
@@ -164,7 +164,8 @@ fn is_kind(stream: &Stream, kind: &str) -> bool {
 fn probe_command(path: &Path) -> Command {
     let mut command = base_command(FFPROBE);
     command
-        .args(["-protocol_whitelist", "file", "-of", "json", "-show_entries"])
+        .args(INPUT_OPTIONS)
+        .args(["-of", "json", "-show_entries"])
         .arg(
             "stream=codec_type,width,height,sample_aspect_ratio,color_space,color_transfer,avg_frame_rate,r_frame_rate,\
              nb_frames,start_time,duration:stream_disposition=attached_pic:stream_side_data=rotation:\
@@ -185,7 +186,12 @@ fn ask(command: &mut Command, path: &Path) -> Result<Answer, VideoError> {
     let unreadable = |what: &str| VideoError::Unreadable { path: path.to_owned(), what: what.to_owned() };
     match ended.status {
         None => return Err(VideoError::Hung { path: path.to_owned() }),
-        Some(status) if !status.success() => return Err(unreadable(what)),
+        Some(status) if !status.success() => {
+            return Err(match find_unlisted_format(&ended.stderr) {
+                Some(format) => VideoError::Unlisted { path: path.to_owned(), format: format.to_owned() },
+                None => unreadable(what),
+            });
+        }
         Some(_) => {}
     }
     // The answer fits into the pipe, so that ffprobe could end before it is read.

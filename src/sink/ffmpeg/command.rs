@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use super::container::Container;
 use crate::color::YcbcrMatrix;
 use crate::sink::Sound;
-use crate::video::command::{FFMPEG, base_command, file_url, frame_timing_option};
+use crate::video::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 
 /// Output parameters of ffmpeg, selected by the file's extension.
 pub(super) struct Format {
@@ -137,7 +137,7 @@ pub(super) fn sound_command(format: &Format, from: &Path, sound: &Sound, length_
     command
         .args(["-nostdin", "-y", "-i"])
         .arg(file_url(from))
-        .args(["-protocol_whitelist", "file"])
+        .args(INPUT_OPTIONS)
         .args(["-ss", &format!("{:.6}", sound.start_s), "-t", &format!("{length_s:.6}"), "-i"])
         .arg(file_url(&sound.path))
         .args(["-map", "0:v", "-map", "1:a", "-c", "copy", "-fflags", "+bitexact"])

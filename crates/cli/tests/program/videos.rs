@@ -167,3 +167,41 @@ fn a_killed_run_leaves_no_decoder() {
     crate::program::until("the decoder ends", std::time::Duration::from_secs(60), gone);
     assert!(!run.runs());
 }
+
+/// Its name is that of a video, but its content names other files.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_list_of_videos_is_not_read_whatever_its_name() {
+    let home = home_with_clip();
+    let ffmpeg = |arguments: &str| {
+        Ran::of(Command::new("ffmpeg").current_dir(home.0.path()).args(["-v", "error"]).args(words(arguments))).done();
+    };
+    ffmpeg("-i clip.mp4 -c copy secret.ts");
+    for (name, content, format) in [
+        ("hls.mp4", "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1.0,\nsecret.ts\n#EXT-X-ENDLIST\n", "hls"),
+        ("concat.mp4", "ffconcat version 1.0\nfile secret.ts\n", "concat"),
+        (
+            "session.mp4",
+            "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=video 5004 RTP/AVP 96\n",
+            "sdp",
+        ),
+    ] {
+        fs::write(home.path(name), content).unwrap();
+        let said = [name, &format!("({format})"), "give the video itself"];
+        home.run(&["stream", name, "--to", "null"]).refused(1, &said);
+        home.run(&["record", name, "--to", "take"]).refused(1, &said);
+        assert!(!home.path("take").exists());
+    }
+    // Videos of all usual kinds are read.
+    for name in
+        "a.mov a.mkv a.webm a.avi a.ts a.mpg a.flv a.ogv a.wmv a.y4m a.gif a.nut a.mxf a.3gp a.h264 a.mjpeg".split(' ')
+    {
+        let size = if name == "a.3gp" { "176x144" } else { "64x48" };
+        ffmpeg(&format!(
+            "-i clip.mp4 -an -r 25 -t 0.4 -vf scale={}:flags=neighbor,format=yuv420p {name}",
+            size.replace('x', ":")
+        ));
+        let ran = home.run(&["stream", name, "--effect", "none", "--to", "null"]);
+        assert!(ran.code == 0, "{name}: {}", ran.stderr);
+    }
+}
