@@ -1,30 +1,31 @@
 //! HEIC pictures through the program `heif-convert` (package libheif-examples), which has their decoder.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Duration;
 
 use tempfile::TempDir;
 
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
+use crate::files::guardian::Guardian;
+use crate::files::process::Process;
 
 const PROGRAM: &str = "heif-convert";
 /// Time after which the program counts as hung; the largest pictures take some seconds.
 const TIMEOUT: Duration = Duration::from_secs(60);
-/// How often the program is polled while waiting for it.
-const TICK: Duration = Duration::from_millis(5);
 /// The name of the converted picture. Several pictures are numbered, `picture-1.png`, and each one's depth is
 /// `picture-depth.png`.
 const PICTURE: &str = "picture.png";
 
-/// A converted picture, in a temporary folder that is removed with it.
+/// A converted picture, in a temporary folder that is removed with it, or when this program is killed.
 pub(super) struct Converted {
     _folder: TempDir,
+    _guardian: Option<Guardian>,
     /// A PNG, upright.
     pub(super) picture: PathBuf,
     /// A PNG of its depth, if there is any; with XMP by newer versions of the program.
@@ -41,16 +42,20 @@ pub(super) fn convert(path: &Path) -> Result<Converted, PictureFault> {
 
 fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
     let folder = TempDir::with_prefix("bokehcam-")?;
-    let messages = folder.path().join("messages");
+    let mut guardian = Guardian::start(folder.path()).ok();
     // An absolute path is no option, whatever its name.
     let mut command = Command::new(program);
     command.arg("--with-aux").arg(path.canonicalize()?).arg(folder.path().join(PICTURE));
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&messages)?);
-    let is_success = run(&mut command).map_err(|error| match error.kind() {
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut process = Process::start(&mut command, &Arc::default()).map_err(|error| match error.kind() {
         ErrorKind::NotFound => FileKind::fault(Some(file_kind::HEIC), ""),
-        ErrorKind::TimedOut => PictureFault::Damaged(format!("{PROGRAM} hung, and was killed")),
         _ => PictureFault::Io(error),
     })?;
+    let mut guard = |group| guardian.iter_mut().for_each(|guardian| guardian.set_group(group));
+    guard(Some(process.group()));
+    let ended = process.wait_at_most(TIMEOUT)?;
+    guard(None);
+    let status = ended.status.ok_or_else(|| PictureFault::Damaged(format!("{PROGRAM} hung, and was killed")))?;
     let files: Vec<_> = fs::read_dir(folder.path())?.flatten().map(|entry| entry.path()).collect();
     let find = |suffixes: [&str; 2]| {
         let ends = |path: &Path| {
@@ -61,30 +66,14 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
         files.iter().find(|path| ends(path)).cloned()
     };
     match find(["", "-1"]) {
-        Some(picture) if is_success => Ok(Converted { picture, depth: find(["-depth", "-1-depth"]), _folder: folder }),
+        Some(picture) if status.success() => {
+            let depth = find(["-depth", "-1-depth"]);
+            Ok(Converted { picture, depth, _folder: folder, _guardian: guardian })
+        }
         _ => {
-            let said = fs::read(&messages).unwrap_or_default();
-            let said = String::from_utf8_lossy(&said);
-            let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it left no picture");
-            Err(PictureFault::Damaged(format!("{PROGRAM}: {}", last.trim())))
+            let last = ended.stderr.rsplit(" | ").next().filter(|line| !line.is_empty());
+            Err(PictureFault::Damaged(format!("{PROGRAM}: {}", last.unwrap_or("it left no picture"))))
         }
-    }
-}
-
-/// Runs a command and returns whether it succeeded; kills it if it hangs.
-fn run(command: &mut Command) -> std::io::Result<bool> {
-    let mut child = command.spawn()?;
-    let started = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait()? {
-            return Ok(status.success());
-        }
-        if started.elapsed() > TIMEOUT {
-            child.kill()?;
-            child.wait()?;
-            return Err(ErrorKind::TimedOut.into());
-        }
-        thread::sleep(TICK);
     }
 }
 
