@@ -1,11 +1,7 @@
 //! Motion JPEG as cameras send it.
 //!
-//! Even in strict mode, the library decodes truncated data and fills in the rest: it reads zeros after the end marker.
-//! So each file is copied into one that it cannot misread (see [`repair`]): a truncated picture runs into bits that are
-//! no valid code, and the decoder reports the error.
+//! Each file is copied into one that the decoder cannot misread (see [`repair_jpeg`]).
 
-mod repair;
-mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -15,8 +11,10 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::PixelError;
+use crate::compute::catch_panic;
 use crate::frame::ColorImage;
 use crate::layout::Layout;
+use crate::recording::jpeg_repair::repair_jpeg;
 
 /// Decodes JPEGs; keeps the buffer for the repaired file.
 #[derive(Debug, Default)]
@@ -28,14 +26,17 @@ impl MotionJpeg {
     /// Decodes the JPEG in `bytes` into `out` (resized to fit), if it is complete and of the layout's size.
     pub(super) fn decode(&mut self, layout: &Layout, bytes: &[u8], out: &mut ColorImage) -> Result<(), PixelError> {
         let expected = (layout.width as usize, layout.height as usize);
-        let found = repair::repair_jpeg(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;
+        let found = repair_jpeg(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;
         if found != expected {
             return Err(PixelError::Size { found, expected });
         }
         let options = DecoderOptions::new_fast().set_strict_mode(true).jpeg_set_out_colorspace(ColorSpace::RGB);
         let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&self.file[..]), options);
         out.resize(layout.width, layout.height);
-        // Errors may span lines.
-        decoder.decode_into(&mut out.rgb).map_err(|error| PixelError::Jpeg(error.to_string().replace('\n', " ")))
+        match catch_panic(|| decoder.decode_into(&mut out.rgb)) {
+            // Errors may span lines.
+            Some(decoded) => decoded.map_err(|error| PixelError::Jpeg(error.to_string().replace('\n', " "))),
+            None => Err(PixelError::Jpeg("it makes the decoder fail".to_owned())),
+        }
     }
 }

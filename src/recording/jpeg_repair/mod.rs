@@ -1,4 +1,7 @@
-//! Copies a camera's JPEG into one in which the decoder detects any missing part.
+//! Copies a JPEG into one in which the decoder detects any missing part.
+//!
+//! Even in strict mode, the library decodes truncated data and fills in the rest: it reads zeros after the end marker.
+//! In the copy, a truncated picture runs into bits that are no valid code, and the decoder reports the error.
 //!
 //! - Data before the start marker and after the end are dropped, and so are comments and thumbnails.
 //! - Missing Huffman tables are inserted.
@@ -6,7 +9,7 @@
 //! - Each run of entropy-coded data is followed by bits that are no valid code (all ones, which no table may assign),
 //!   where the decoder of a complete picture never reads. A missing end marker is added.
 
-use super::tables;
+mod tables;
 
 mod marker {
     pub const SOF: std::ops::RangeInclusive<u8> = 0xC0..=0xCF;
@@ -41,7 +44,7 @@ const INVALID_CODE: [u8; 32] = {
 
 /// Why a file cannot be a complete picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Fault {
+pub(crate) enum Fault {
     #[error("there is no start marker")]
     NoStart,
     #[error("it ends within its header")]
@@ -52,15 +55,17 @@ pub(super) enum Fault {
     Coding(u8),
     #[error("a part of the picture is missing: its restart markers are not consecutive")]
     Restart,
+    #[error("a part of the picture is missing: it has only the first scan of a progressive one")]
+    Scans,
 }
 
 /// Writes the JPEG in `bytes` to `file`, repaired as above; returns its width and height.
-pub(super) fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
+pub(crate) fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
     let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
     let mut rest = strip_padding(&bytes[start + 2..]);
     file.clear();
     file.extend([0xFF, marker::SOI]);
-    let (mut frame, mut has_huffman_tables, mut has_scan, mut interval) = (None::<Frame>, false, false, 0);
+    let (mut frame, mut has_huffman_tables, mut scans, mut interval) = (None::<Frame>, false, 0, 0);
     while let Some((code, segment, after)) = next_segment(rest) {
         match code {
             marker::EOI | marker::SOI => break,
@@ -82,12 +87,15 @@ pub(super) fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, us
                 tables::append_huffman_tables(file);
                 has_huffman_tables = true;
             }
-            has_scan = true;
             file.extend(segment);
+            // Scans of some components have units of their own, and the decoder must find what follows directly behind
+            // them, as behind the first scan of a progressive picture.
+            let is_whole = !frame.progressive && segment.get(4) == Some(&frame.components);
+            let is_marked = is_whole || frame.progressive && scans > 0;
+            scans += 1;
             let restarts;
-            (rest, restarts) = copy_scan(after, !frame.progressive, file)?;
-            // Only a scan of all components: others have units of their own, and no camera sends them.
-            if !frame.progressive && segment.get(4) == Some(&frame.components) {
+            (rest, restarts) = copy_scan(after, is_marked, file)?;
+            if is_whole {
                 let expected = if interval == 0 { 0 } else { frame.units.div_ceil(interval) - 1 };
                 // Some cameras end the last interval with a restart, too.
                 if restarts < expected || restarts > expected + usize::from(interval != 0) {
@@ -101,8 +109,10 @@ pub(super) fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, us
         }
         rest = after;
     }
-    if !has_scan {
-        return Err(Fault::Header);
+    match (scans, &frame) {
+        (0, _) => return Err(Fault::Header),
+        (1, Some(frame)) if frame.progressive => return Err(Fault::Scans),
+        _ => {}
     }
     file.extend([0xFF, marker::EOI]);
     frame.map(|frame| frame.size).ok_or(Fault::NoSize)
@@ -160,9 +170,9 @@ fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((code, &rest[at..at + 2 + length], following))
 }
 
-/// Copies coded data up to the next marker that ends them, with [`INVALID_CODE`] after each run if `sequential`.
+/// Copies coded data up to the next marker that ends them, with [`INVALID_CODE`] after each run if `is_marked`.
 /// Returns the remaining data, from that marker on, and the number of restarts.
-fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
+fn copy_scan<'a>(bytes: &'a [u8], is_marked: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
     let (mut from, mut at, mut restarts) = (0, 0, 0);
     loop {
         let next = bytes[at..].iter().position(|&byte| byte == 0xFF).map(|found| at + found);
@@ -182,7 +192,7 @@ fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Resul
             }
             _ => file.extend(&bytes[from..end]),
         }
-        if sequential {
+        if is_marked {
             file.extend(INVALID_CODE);
         }
         match code {
