@@ -3,70 +3,121 @@
 use std::fs::File;
 use std::io::BufReader;
 
+use exr::block::reader::ChunksReader;
+use exr::block::{self, lines::LineRef};
 use exr::error::Error;
-use exr::image::{AnyChannel, FlatSamples};
-use exr::meta::MetaData;
-use exr::prelude::{ReadChannels, ReadLayers, read as exr_reader};
+use exr::io::Data;
+use exr::meta::attribute::{ChannelDescription, SampleType};
+use exr::meta::header::Header;
+use exr::prelude::f16;
 
 use super::values::{ColorCount, Samples, Values};
+use crate::recording::MAX_PIXELS;
 use crate::recording::coded::check_size;
 use crate::recording::fault::PictureFault;
 
 /// Names of a channel with depth, in order of preference: the standard's, those of renderers, grey, and colours.
 const NAMES: [&str; 6] = ["Z", "depth", "V", "Y", "R", "X"];
 
-/// Reads the first layer that has a channel with depth.
-pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
-    // The size is checked before the pixels take memory.
-    let meta = MetaData::read_from_buffered(BufReader::new(&mut file), false).map_err(fault)?;
-    for header in &meta.headers {
-        check_side(header.layer_size.0, header.layer_size.1)?;
+/// Most samples in a layer, which are decompressed to find those of one channel: a hundred channels of 19 megapixels.
+const MAX_SAMPLES: u64 = 16 * MAX_PIXELS;
+/// Most bytes in a block, a tile or some rows of all channels: the decoder has memory for some blocks.
+const MAX_BLOCK_BYTES: usize = 256 << 20;
+
+/// Reads the channel with depth of the first layer that has one, block by block, and no other layer.
+pub(super) fn read(file: File) -> Result<Values, PictureFault> {
+    let reader = block::read(BufReader::new(file), false).map_err(fault)?;
+    for header in reader.headers() {
+        check_side(header)?;
     }
-    std::io::Seek::rewind(&mut file)?;
-    let image = exr_reader().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let image = image.from_buffered(BufReader::new(file)).map_err(fault)?;
-    // A layer of colours may come before that of depth.
-    let found = NAMES.iter().find_map(|name| {
-        image.layer_data.iter().find_map(|layer| {
-            let channels = &layer.channel_data.list;
-            channels.iter().find(|channel| is_named(channel, name)).map(|channel| (layer.size, channels, channel))
+    let (layer, channel) = find_depth(reader.headers())
+        .ok_or_else(|| PictureFault::NotAMap("an EXR without a channel Z, V or Y".to_owned()))?;
+    let header = &reader.headers()[layer];
+    let size = check_side(header)?;
+    let channels = header.channels.list.len();
+    let samples = channels as u64 * u64::from(size.0) * u64::from(size.1);
+    if samples > MAX_SAMPLES || header.max_block_byte_size() > MAX_BLOCK_BYTES {
+        let what = format!("an EXR with {channels} channels of {}x{} pixels", size.0, size.1);
+        return Err(PictureFault::NotAMap(what));
+    }
+
+    let wanted: Vec<usize> = [channel].into_iter().chain(find_colors_beside(header, channel)).collect();
+    let (width, pixels) = (size.0 as usize, size.0 as usize * size.1 as usize);
+    let mut numbers = vec![vec![0.0; pixels]; wanted.len()];
+    let chunks =
+        reader.filter_chunks(false, |_, tile, block| block.layer == layer && tile.is_largest_resolution_level());
+    let read = chunks.and_then(|chunks| {
+        chunks.decompress_sequential(false, |meta, block| {
+            let channels = &meta.headers[layer].channels;
+            for line in block.lines(channels) {
+                let Some(place) = wanted.iter().position(|&wanted| wanted == line.location.channel) else { continue };
+                let from = line.location.position.y() * width + line.location.position.x();
+                let row = numbers[place].get_mut(from..from + line.location.sample_count);
+                let row = row.ok_or_else(|| Error::Invalid("block position".into()))?;
+                read_line(&line, channels.list[line.location.channel].sample_type, row)?;
+            }
+            Ok(())
         })
     });
-    let (size, channels, channel) =
-        found.ok_or_else(|| PictureFault::NotAMap("an EXR without a channel Z, V or Y".to_owned()))?;
-    check_grey(channels, channel)?;
-    let size = check_side(size.0, size.1)?;
-    let numbers = channel.sample_data.values_as_f32().collect();
-    Ok(Values { size, numbers, samples: Samples::Float, ..Values::default() })
+    read.map_err(fault)?;
+    if let [red, green, blue] = &numbers[..] {
+        let mut colors = ColorCount::new(Samples::Float.white());
+        red.iter().zip(green.iter().zip(blue)).for_each(|(red, (green, blue))| colors.add([*red, *green, *blue]));
+        colors.check(pixels)?;
+    }
+    Ok(Values { size, numbers: numbers.swap_remove(0), samples: Samples::Float, ..Values::default() })
+}
+
+/// Returns the layer and the channel with depth. A layer of colours may come before that of depth.
+fn find_depth(headers: &[Header]) -> Option<(usize, usize)> {
+    NAMES.iter().find_map(|name| {
+        headers.iter().enumerate().filter(|(_, header)| !header.deep).find_map(|(layer, header)| {
+            let channel = header.channels.list.iter().position(|channel| is_named(channel, name))?;
+            Some((layer, channel))
+        })
+    })
 }
 
 /// Returns whether a channel has this name, within a layer (`View.Depth.Z`) or as one (`depth.V`).
-fn is_named(channel: &AnyChannel<FlatSamples>, name: &str) -> bool {
+fn is_named(channel: &ChannelDescription, name: &str) -> bool {
     let own = channel.name.to_string();
     let [layer, last] = [own.split('.').next(), own.rsplit('.').next()];
     [layer, last].into_iter().flatten().any(|part| part.eq_ignore_ascii_case(name))
 }
 
-/// Refuses a channel R if G and B beside it differ from it.
-fn check_grey(channels: &[AnyChannel<FlatSamples>], found: &AnyChannel<FlatSamples>) -> Result<(), PictureFault> {
-    let own = found.name.to_string();
+/// Returns the channels G and B beside a channel R, which is no depth if they differ from it; empty unless all are there.
+fn find_colors_beside(header: &Header, found: usize) -> Vec<usize> {
+    let channels = &header.channels.list;
+    let own = channels[found].name.to_string();
+    if !own.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case("R")) {
+        return Vec::new();
+    }
     let beside = |name: &str| {
         // `own` ends with `R`.
         let other = format!("{}{name}", &own[..own.len() - 1]);
-        channels.iter().find(|channel| channel.name.to_string().eq_ignore_ascii_case(&other))
+        channels.iter().position(|channel| channel.name.to_string().eq_ignore_ascii_case(&other))
     };
-    if !own.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case("R")) {
-        return Ok(());
-    }
-    let (Some(green), Some(blue)) = (beside("G"), beside("B")) else { return Ok(()) };
-    let mut colors = ColorCount::new(Samples::Float.white());
-    let [red, green, blue] = [found, green, blue].map(|channel| channel.sample_data.values_as_f32());
-    red.zip(green.zip(blue)).for_each(|(red, (green, blue))| colors.add([red, green, blue]));
-    colors.check(found.sample_data.len())
+    [beside("G"), beside("B")].into_iter().collect::<Option<_>>().unwrap_or_default()
 }
 
-fn check_side(width: usize, height: usize) -> Result<(u32, u32), PictureFault> {
-    let [width, height] = [width, height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+/// Reads the samples of a line as floats.
+fn read_line(line: &LineRef, kind: SampleType, row: &mut [f32]) -> Result<(), Error> {
+    fn fill<T: Data>(line: &LineRef, row: &mut [f32], to_float: fn(T) -> f32) -> Result<(), Error> {
+        row.iter_mut().zip(line.read_samples()).try_for_each(|(number, sample)| {
+            *number = to_float(sample?);
+            Ok(())
+        })
+    }
+    match kind {
+        SampleType::F16 => fill(line, row, f16::to_f32),
+        SampleType::F32 => fill(line, row, |sample: f32| sample),
+        SampleType::U32 => fill(line, row, |sample: u32| sample as f32),
+    }
+}
+
+fn check_side(header: &Header) -> Result<(u32, u32), PictureFault> {
+    let size = header.layer_size;
+    let [width, height] = [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
     check_size(width, height)?;
     Ok((width, height))
 }

@@ -12,7 +12,7 @@ use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use tempfile::TempDir;
 
 use super::assert_says;
-use encode::{bytes_of, exr, npy, npz, tiff};
+use encode::{bytes_of, exr, exr_that_claims, npy, npz, tiff};
 
 type Gray16 = ImageBuffer<Luma<u16>, Vec<u16>>;
 
@@ -66,6 +66,21 @@ fn floats_of_every_format_are_metres() {
     }
     exr(&path("z.exr"), &[&[("alpha", &DEPTHS_M)]]);
     assert_says(read(&path("z.exr"), Options::default()), &["z.exr", "without a channel"]);
+}
+
+#[test]
+fn an_exr_of_too_many_channels_is_refused_by_its_header() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("big.exr");
+    for (channels, width, height, said) in [
+        (20, 16384, 6250, "an EXR with 20 channels of 16384x6250 pixels"),
+        // Few pixels, but 16 rows of all channels are decompressed at once.
+        (1000, 16384, 16, "an EXR with 1000 channels of 16384x16 pixels"),
+        (60, 4000, 3000, "copy or export it again"),
+    ] {
+        fs::write(&path, exr_that_claims(channels, width, height)).unwrap();
+        assert_says(read(&path, Options::default()), &["big.exr", said]);
+    }
 }
 
 #[test]

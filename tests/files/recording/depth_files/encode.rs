@@ -80,6 +80,36 @@ pub fn tiff(bits: u16, format: u16, orientation: u32, data: &[u8]) -> Vec<u8> {
     file
 }
 
+/// The beginning of an EXR of floats that claims `channels` channels of `width` x `height` pixels: its header.
+pub fn exr_that_claims(channels: u32, width: i32, height: i32) -> Vec<u8> {
+    let mut list = Vec::new();
+    for channel in 0..channels {
+        // A float, not linear, without subsampling.
+        list.extend(format!("Z.{channel:04}\0").bytes());
+        list.extend([2_u32, 0, 1, 1].map(u32::to_le_bytes).as_flattened());
+    }
+    list.push(0);
+    let window = [0, 0, width - 1, height - 1].map(i32::to_le_bytes);
+    let mut file = b"\x76\x2f\x31\x01\x02\0\0\0".to_vec();
+    for (name, kind, value) in [
+        ("channels", "chlist", &list[..]),
+        // ZIP of 16 rows.
+        ("compression", "compression", &[3]),
+        ("dataWindow", "box2i", window.as_flattened()),
+        ("displayWindow", "box2i", window.as_flattened()),
+        ("lineOrder", "lineOrder", &[0]),
+        ("pixelAspectRatio", "float", &1_f32.to_le_bytes()),
+        ("screenWindowCenter", "v2f", &[0; 8]),
+        ("screenWindowWidth", "float", &1_f32.to_le_bytes()),
+    ] {
+        file.extend(format!("{name}\0{kind}\0").bytes());
+        file.extend((value.len() as u32).to_le_bytes());
+        file.extend(value);
+    }
+    file.push(0);
+    file
+}
+
 /// Writes an EXR of layers, each with these channels.
 pub fn exr(path: &Path, layers: &[&[(&str, &[f32])]]) {
     use exr::prelude::*;
