@@ -17,6 +17,8 @@ const STATISTICS: u8 = 11;
 
 /// Bytes of messages that are collected in a chunk: some frames, so that a reader can jump.
 const CHUNK_BYTES: usize = 4 << 20;
+/// Length of a chunk in nanoseconds: what is lost at most if the program is killed.
+const CHUNK_NS: u64 = 500_000_000;
 
 /// First and last time in nanoseconds.
 type TimeRange = (u64, u64);
@@ -98,7 +100,10 @@ impl<W: Write> FileWriter<W> {
             let (first, last) = times.unwrap_or((time_ns, time_ns));
             *times = Some((first.min(time_ns), last.max(time_ns)));
         }
-        if self.chunk.len() > CHUNK_BYTES { self.write_chunk() } else { Ok(()) }
+        let (first, last) = self.chunk_times.unwrap_or_default();
+        // The first one is short, so that there is something to keep from the beginning.
+        let is_full = self.chunk.len() > CHUNK_BYTES || last - first >= CHUNK_NS || self.chunk_count == 0;
+        if is_full { self.write_chunk() } else { Ok(()) }
     }
 
     fn write_chunk(&mut self) -> io::Result<()> {
@@ -126,7 +131,8 @@ impl<W: Write> FileWriter<W> {
         add_record(&mut self.chunks, CHUNK_INDEX, &content);
         self.chunk_count += 1;
         self.chunk.clear();
-        self.write(&record)
+        self.write(&record)?;
+        self.stream.flush()
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {

@@ -8,7 +8,7 @@ use crate::recording::raw_image::RawImage;
 pub(super) const MAX_MESSAGE_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + (1 << 16);
 
 /// The type of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Kind {
     /// Pixels row by row.
     Image,
@@ -28,7 +28,7 @@ impl Kind {
 }
 
 /// The encoding of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Encoding {
     Cdr,
     Ros1,

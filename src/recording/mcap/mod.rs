@@ -2,6 +2,7 @@
 //! by the times at which they were taken.
 
 mod cameras;
+mod channels;
 mod chunk;
 mod definitions;
 mod fields;

@@ -4,15 +4,15 @@
 //! record. It skips what is in the messages: of a file without compression it reads some hundred bytes per picture.
 //! Compressed chunks are decompressed, because only a message itself has the time at which its picture was taken.
 
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::time::{Duration, Instant};
 
 use super::cameras::{self, Cameras};
+use super::channels::{Channels, MAX_TOPICS};
 use super::chunk::Chunk;
 use super::fields::Fields;
-use super::message::{Encoding, Kind, MAX_MESSAGE_BYTES, Preview};
+use super::message::{MAX_MESSAGE_BYTES, Preview};
 use super::topic::{Message, Topic};
 use crate::recording::list::MAX_ENTRIES;
 
@@ -38,12 +38,9 @@ const MAX_COMPRESSION_BYTES: usize = 16;
 
 /// Largest schema or channel that is read; others have no pictures.
 const MAX_DEFINITION_BYTES: u64 = 1 << 20;
-/// Longest name of a topic that is read.
-const MAX_NAME_BYTES: usize = 1024;
-/// Number of characters that are kept of a type's name.
-const MAX_TYPE_CHARS: usize = 80;
-/// Number of topics without pictures that a message lists.
-const MAX_OTHERS: usize = 12;
+/// Decompressed bytes of all chunks together: a part that any file may have, and a multiple of the compressed file.
+const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
+const MAX_RATIO: u64 = 200;
 
 /// Buffer of the pass, small because most of a file is skipped.
 const BUFFER_BYTES: usize = 1 << 13;
@@ -96,10 +93,9 @@ pub(super) fn scan(file: &File, name: &str) -> io::Result<Contents> {
         found: Contents::default(),
         file,
         name,
-        schemas: HashMap::new(),
-        channels: HashMap::new(),
-        camera_channels: HashMap::new(),
+        channels: Channels::default(),
         message_count: 0,
+        bytes_left: MAX_DECOMPRESSED_BYTES.saturating_add(bytes.saturating_mul(MAX_RATIO)),
         began: Instant::now(),
         has_warned: false,
     };
@@ -118,13 +114,10 @@ struct Scanner<'a> {
     found: Contents,
     file: &'a File,
     name: &'a str,
-    /// Types of messages.
-    schemas: HashMap<u16, String>,
-    /// Positions of topics with pictures, by channel.
-    channels: HashMap<u16, usize>,
-    /// Topics that describe cameras, by channel.
-    camera_channels: HashMap<u16, (String, cameras::Kind, Encoding)>,
+    channels: Channels,
     message_count: usize,
+    /// Bytes that the chunks may still have after decompression.
+    bytes_left: u64,
     began: Instant,
     has_warned: bool,
 }
@@ -134,11 +127,19 @@ impl Scanner<'_> {
         self.found.damage.get_or_insert(what);
     }
 
+    fn warn_if_slow(&mut self) {
+        if !self.has_warned && self.began.elapsed() > SLOW {
+            self.has_warned = true;
+            tracing::warn!("{}: looking through the file; this takes long", self.name);
+        }
+    }
+
     /// Scans records up to `end`; `chunk` is the number of the compressed chunk that they are in.
     fn scan_records(&mut self, reader: &mut (impl Read + Seek), at: &mut u64, end: u64, chunk: Option<u32>) -> End {
         // End of the chunk without compression that these records are in.
         let mut chunk_end = None;
         while *at < end {
+            self.warn_if_slow();
             if end - *at < HEAD_BYTES {
                 return Err(Damage::Fault(CUT.to_owned()));
             }
@@ -176,9 +177,12 @@ impl Scanner<'_> {
                     let mut content = vec![0; length as usize];
                     reader.read_exact(&mut content)?;
                     let defined = match head[0] {
-                        SCHEMA => self.define_schema(&content),
-                        _ => self.define_channel(&content),
+                        SCHEMA => self.channels.define_schema(&content),
+                        _ => self.channels.define(&content, &mut self.found),
                     };
+                    if self.found.topics.len() > MAX_TOPICS {
+                        return Err(Damage::Fault(format!("more than {MAX_TOPICS} topics with pictures")));
+                    }
                     if defined.is_none() {
                         self.note_damage(format!("a schema or channel at byte {at} is damaged"));
                     }
@@ -194,41 +198,6 @@ impl Scanner<'_> {
             Some(_) => Ok(()),
             None => Err(Damage::Fault("the end of the file is missing".to_owned())),
         }
-    }
-
-    fn define_schema(&mut self, content: &[u8]) -> Option<()> {
-        let mut fields = Fields::packed(content);
-        let (id, name) = (fields.u16()?, fields.text()?);
-        self.schemas.insert(id, name.chars().take(MAX_TYPE_CHARS).collect());
-        Some(())
-    }
-
-    fn define_channel(&mut self, content: &[u8]) -> Option<()> {
-        let mut fields = Fields::packed(content);
-        let (id, schema, name, encoding) = (fields.u16()?, fields.u16()?, fields.text()?, fields.text()?);
-        if self.channels.contains_key(&id) || name.len() > MAX_NAME_BYTES {
-            return Some(());
-        }
-        let kind = self.schemas.get(&schema).map_or("no type", String::as_str);
-        if let Some((camera, encoding)) = cameras::Kind::of_topic(name, kind).zip(Encoding::from_name(encoding)) {
-            self.camera_channels.insert(id, (name.to_owned(), camera, encoding));
-        }
-        if let (Some(kind), Some(encoding)) = (Kind::from_type(kind), Encoding::from_name(encoding)) {
-            let topics = &mut self.found.topics;
-            let is_same = |topic: &Topic| (&*topic.name, topic.kind, topic.encoding) == (name, kind, encoding);
-            let topic = topics.iter().position(is_same).unwrap_or_else(|| {
-                topics.push(Topic::new(name, kind, encoding));
-                topics.len() - 1
-            });
-            self.channels.insert(id, topic);
-        } else {
-            let text = format!("{name} ({kind}, {encoding})").escape_debug().to_string();
-            let others = &mut self.found.others;
-            if others.len() < MAX_OTHERS && !others.contains(&text) {
-                others.push(text);
-            }
-        }
-        Some(())
     }
 
     /// Notes a message with a picture; returns the number of bytes read.
@@ -248,7 +217,7 @@ impl Scanner<'_> {
             return Ok(read as u64);
         };
         let Some(length) = length.checked_sub(MESSAGE_HEAD_BYTES) else { return Ok(read as u64) };
-        let Some(&topic) = self.channels.get(&channel) else {
+        let Some(topic) = self.channels.topic(channel) else {
             return Ok(read as u64 + self.scan_cameras(reader, channel, length)?);
         };
         let previewed = length.min(Preview::BYTES as u64) as usize;
@@ -280,7 +249,7 @@ impl Scanner<'_> {
 
     /// Reads a message that may describe cameras; returns the number of bytes read.
     fn scan_cameras(&mut self, reader: &mut impl Read, channel: u16, length: u64) -> Result<u64, Damage> {
-        let Some((topic, kind, encoding)) = self.camera_channels.get(&channel) else { return Ok(0) };
+        let Some((topic, kind, encoding)) = self.channels.camera(channel) else { return Ok(0) };
         let cameras = &mut self.found.cameras;
         if length > cameras::MAX_BYTES || cameras.knows(topic, *kind) {
             return Ok(0);
@@ -303,10 +272,6 @@ impl Scanner<'_> {
         next: u64,
         end: u64,
     ) -> Result<Option<u64>, Damage> {
-        if !self.has_warned && self.began.elapsed() > SLOW {
-            self.has_warned = true;
-            tracing::warn!("{}: looking through the file; this takes long", self.name);
-        }
         let mut head = [0; CHUNK_HEAD_BYTES as usize];
         reader.read_exact(&mut head)?;
         let mut fields = Fields::packed(&head[16..]);
@@ -329,6 +294,9 @@ impl Scanner<'_> {
             return Ok(None);
         }
         let name = String::from_utf8_lossy(&name).into_owned();
+        self.bytes_left = self.bytes_left.checked_sub(bytes).ok_or_else(|| {
+            Damage::Fault(format!("its chunks are compressed to less than a {MAX_RATIO}th, as no recording is"))
+        })?;
         let number = self.found.chunks.len() as u32;
         match Chunk::new(&name, coded_at, coded_bytes, bytes, crc).and_then(|chunk| Ok((chunk.read(self.file)?, chunk)))
         {

@@ -1,6 +1,6 @@
 //! Writes a recording as an MCAP file of ROS 2.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind};
 use std::path::{Path, PathBuf};
 
@@ -66,8 +66,10 @@ impl Writer {
             return Err(RecordingError::Exists { path: path.to_owned() });
         }
         for part in atomic_file::find_abandoned(path).unwrap_or_default() {
-            // Another process may do the same.
-            if let Ok(kept) = atomic_file::keep_incomplete(&part, path) {
+            if part.metadata().is_ok_and(|part| part.len() == 0) {
+                // Killed before its first frame; another process may do the same.
+                let _ = fs::remove_file(&part);
+            } else if let Ok(kept) = atomic_file::keep_incomplete(&part, path) {
                 tracing::warn!("{}: what a killed run had written is kept as {}", path.display(), kept.display());
             }
         }

@@ -2,6 +2,8 @@
 //! programs (Python's mcap-ros2-support, zipfile and pyliblzfse): three frames of 24x16, 0.1 s apart, of the colour
 //! (10 k, 100, 200) and the depth k + 1 m.
 
+mod limits;
+
 use std::fs;
 use std::path::Path;
 
