@@ -40,8 +40,10 @@ const BLOCK: u32 = 0xA1;
 /// Bits of a block's flags: several frames share it.
 const LACING: u8 = 0b110;
 
-/// Bytes that are read of an element at once: its head, and that of a block.
+/// Bytes that are looked at of an element: its head, and that of a block.
 const READ_BYTES: usize = 32;
+/// Bytes that are read at once, for the heads of small elements that follow each other.
+const BUFFER_BYTES: u64 = 4096;
 /// Definitions of tracks and tags that are read; recorders write some thousand bytes.
 const MAX_DEFINITION_BYTES: u64 = 1 << 22;
 /// Number of tracks, and of attachments, that are noted.
@@ -151,6 +153,9 @@ struct Scanner<'a> {
     name: &'a str,
     /// Position of the next element.
     at: u64,
+    /// The part of the file that was read last, from `buffer_at`.
+    buffer: Vec<u8>,
+    buffer_at: u64,
     end: u64,
     /// Ends of the segment, and of the cluster that `at` is in, if they are stated.
     segment_end: Option<u64>,
@@ -169,6 +174,8 @@ impl<'a> Scanner<'a> {
             file,
             name,
             at: 0,
+            buffer: Vec::new(),
+            buffer_at: 0,
             end,
             segment_end: None,
             cluster_end: None,
@@ -182,6 +189,7 @@ impl<'a> Scanner<'a> {
 
     fn scan(mut self, is_start: bool) -> io::Result<Contents> {
         while self.at < self.end {
+            self.warn_if_slow();
             self.cluster_end = self.cluster_end.filter(|&end| self.at < end);
             match self.scan_element(is_start) {
                 Ok(next) => self.at = next,
@@ -209,12 +217,27 @@ impl<'a> Scanner<'a> {
         self.found.damage.get_or_insert(what);
     }
 
+    /// Reads the beginning of the element at `self.at`, into the start of `bytes`; returns how many bytes there are.
+    fn read_head(&mut self, bytes: &mut [u8; READ_BYTES]) -> io::Result<usize> {
+        let length = (self.end - self.at).min(READ_BYTES as u64) as usize;
+        let is_buffered =
+            self.at >= self.buffer_at && self.at + length as u64 <= self.buffer_at + self.buffer.len() as u64;
+        if !is_buffered {
+            self.buffer = read(self.file, self.at, (self.end - self.at).min(BUFFER_BYTES))?;
+            self.buffer_at = self.at;
+        }
+        bytes[..length].copy_from_slice(&self.buffer[(self.at - self.buffer_at) as usize..][..length]);
+        Ok(length)
+    }
+
     /// Scans the element at `self.at`; returns where the next one is: after it, or inside.
     fn scan_element(&mut self, is_start: bool) -> Result<u64, Stop> {
-        let bytes = read(self.file, self.at, (self.end - self.at).min(READ_BYTES as u64))?;
+        let mut bytes = [0; READ_BYTES];
+        let length = self.read_head(&mut bytes)?;
+        let bytes = &bytes[..length];
         let is_whole = bytes.len() >= ebml::MAX_HEAD_BYTES;
         let no_element = if is_whole { "something that is no element" } else { CUT };
-        let head = Head::parse(&bytes).ok_or(Stop::Fault(no_element))?;
+        let head = Head::parse(bytes).ok_or(Stop::Fault(no_element))?;
         let inside = self.at + head.bytes as u64;
         let after = head.length.map(|length| inside.saturating_add(length));
         match head.id {
@@ -225,7 +248,6 @@ impl<'a> Scanner<'a> {
             CLUSTER if is_start => return Err(Stop::Pictures),
             CLUSTER => {
                 (self.cluster_end, self.cluster_ticks) = (after, None);
-                self.warn_if_slow();
                 return Ok(inside);
             }
             ATTACHED_FILE => {
