@@ -278,6 +278,11 @@ fn create_part_name(name: &OsStr) -> OsString {
     part
 }
 
+/// Returns whether a name is that of a part file.
+pub fn is_part_name(name: &OsStr) -> bool {
+    parse_part_name(name).is_some()
+}
+
 /// Returns the final name of a part file; `None` if the name does not have the form of [`create_part_name`].
 fn parse_part_name(part: &OsStr) -> Option<&OsStr> {
     let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;

@@ -8,7 +8,7 @@ use super::contents::{ListPosition, PictureSource};
 use super::error::RecordingError;
 use super::fault::LineFault;
 use super::timeline::MAX_LENGTH_NS;
-use crate::files::input;
+use crate::files::{atomic_file, input};
 
 /// Maximum number of lines: nine hours at 30 frames per second.
 pub(super) const MAX_ENTRIES: usize = 1_000_000;
@@ -50,13 +50,15 @@ pub(super) fn read_list<T>(
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
     let bytes = input::read(&path, input::MAX_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
+    // The last line of an interrupted list may be cut.
+    let bytes = if atomic_file::is_part_name(list.as_ref()) { whole_lines(&bytes) } else { &bytes };
     // Count before parsing: an entry takes far more memory than its line.
-    if split_lines(&bytes).nth(MAX_ENTRIES).is_some() {
+    if split_lines(bytes).nth(MAX_ENTRIES).is_some() {
         return Err(RecordingError::LongList { list: path, most: MAX_ENTRIES });
     }
     let list: Arc<str> = list.into();
     let position = |line| ListPosition { list: Arc::clone(&list), line };
-    let entries: Vec<T> = split_lines(&bytes).map(|(line, text)| parse(position(line), text)).collect();
+    let entries: Vec<T> = split_lines(bytes).map(|(line, text)| parse(position(line), text)).collect();
     if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
 }
 
@@ -122,6 +124,11 @@ fn longest_increasing(times: &[u64]) -> Vec<bool> {
         at = next[index];
     }
     is_kept
+}
+
+/// Returns the lines that have their end.
+pub(super) fn whole_lines(bytes: &[u8]) -> &[u8] {
+    &bytes[..bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)]
 }
 
 /// Returns number (from 1) and text of the lines that are neither blank nor comments.

@@ -2,13 +2,13 @@
 
 use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::files::atomic_file::{self, PartFile};
 use crate::files::folder::{self, Folder};
 use crate::files::input;
 use crate::recording::error::RecordingError;
-use crate::recording::list::split_lines;
+use crate::recording::list::{split_lines, whole_lines};
 
 /// A list under construction. Each line is written at once, so that it survives if the process is killed.
 pub(super) struct GrowingList {
@@ -80,10 +80,19 @@ impl GrowingList {
     }
 }
 
+/// Returns the hidden name of the list `name` that a killed process left unfinished in `dir`; `None` without entries.
+pub(super) fn find_interrupted(dir: &Path, name: &str) -> Option<String> {
+    let has_entry = |list: &PathBuf| {
+        input::read(list, input::MAX_TEXT_BYTES).is_ok_and(|text| split_lines(whole_lines(&text)).next().is_some())
+    };
+    let list = atomic_file::find_abandoned(&dir.join(name)).ok()?.into_iter().find(has_entry)?;
+    Some(list.file_name()?.to_str()?.to_owned())
+}
+
 /// Truncates an incomplete last line of a list; returns whether any entry is left.
 fn truncate_partial_line(list: &Path) -> io::Result<bool> {
     let text = input::read(list, input::MAX_TEXT_BYTES)?;
-    let whole_lines = &text[..text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)];
+    let whole_lines = whole_lines(&text);
     let file = OpenOptions::new().write(true).open(list)?;
     file.set_len(whole_lines.len() as u64)?;
     file.sync_all()?;

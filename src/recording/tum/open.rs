@@ -1,9 +1,10 @@
-//! Builds frames from the lists.
+//! Builds frames from the lists, which have hidden names if the recording was interrupted.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::associations::find_associations;
+use super::growing::find_interrupted;
 use super::{COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::contents::{Contents, DepthFormat, ListedFrame, Locator, PictureSource, RecordingFolder};
 use crate::recording::decode::{self, PictureKind};
@@ -16,7 +17,9 @@ const MAX_PICTURES: usize = 1000;
 
 /// Returns whether `dir` has a list of this layout.
 pub(super) fn is_tum_folder(dir: &Path) -> bool {
-    [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists()) || !find_associations(dir).is_empty()
+    [COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists())
+        || !find_associations(dir).is_empty()
+        || find_interrupted(dir, COLOR_LIST).is_some()
 }
 
 /// Reads the lists in `folder`.
@@ -28,15 +31,25 @@ pub(super) fn open(folder: &RecordingFolder, options: &Options) -> Result<Conten
         ([one, other, ..], ..) => {
             Err(RecordingError::TwoLists { dir: dir.clone(), lists: [one.clone(), other.clone()] })
         }
-        ([], true, has_depth) => from_lists(dir, has_depth, options),
-        ([], false, _) => {
-            Err(RecordingError::MissingList { dir: dir.clone(), missing: COLOR_LIST, present: DEPTH_LIST })
+        ([], true, has_depth) => from_lists(dir, COLOR_LIST, has_depth.then_some(DEPTH_LIST), options),
+        ([], false, has_depth) => {
+            let color = find_interrupted(dir, COLOR_LIST).ok_or_else(|| RecordingError::MissingList {
+                dir: dir.clone(),
+                missing: COLOR_LIST,
+                present: DEPTH_LIST,
+            })?;
+            // The list of depth is finished first.
+            let depth = if has_depth { Some(DEPTH_LIST.to_owned()) } else { find_interrupted(dir, DEPTH_LIST) };
+            let contents = from_lists(dir, &color, depth.as_deref(), options)?;
+            let frames = contents.frames.len();
+            tracing::warn!("{}: the recording was interrupted; {frames} frames are played", dir.display());
+            Ok(contents)
         }
     }
 }
 
-/// Pairs `rgb.txt` with `depth.txt`, if it exists, by nearest time.
-fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents, RecordingError> {
+/// Pairs the list of colour pictures with that of depth, if there is one, by nearest time.
+fn from_lists(dir: &Path, color: &str, depth: Option<&str>, options: &Options) -> Result<Contents, RecordingError> {
     let read = |list| {
         let mut entries = list::read_list(dir, list)?;
         clear_unordered_times(entries.iter_mut());
@@ -45,12 +58,12 @@ fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents
         }
         Ok::<_, RecordingError>(entries)
     };
-    let colors = read(COLOR_LIST)?;
-    if !has_depth {
+    let colors = read(color)?;
+    let Some(depth) = depth else {
         let frames = colors.into_iter().map(|color| to_frame(color, None)).collect();
         return Ok(to_contents(frames, None, Unpaired::default()));
-    }
-    let paired = pair::pair_by_time(colors, read(DEPTH_LIST)?, options.pair_tolerance_ns);
+    };
+    let paired = pair::pair_by_time(colors, read(depth)?, options.pair_tolerance_ns);
     if paired.frames.iter().all(|(_, depth)| depth.is_none()) {
         return Err(RecordingError::NoPairs { dir: dir.to_owned(), tolerance_ns: options.pair_tolerance_ns });
     }

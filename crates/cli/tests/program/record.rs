@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 use std::fs;
+use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -200,6 +201,49 @@ fn a_killed_recording_gets_its_lists() {
     assert!(ran.code == 1 && ran.stderr.contains("rgb.txt: restored from an interrupted"), "{}", ran.stderr);
     assert!(read(&at("new")).0 >= 2);
     assert!(!names(&at("new")).iter().any(|name| name.ends_with(".part")), "{:?}", names(&at("new")));
+}
+
+#[test]
+fn a_killed_recording_is_played() {
+    let home = Home::new();
+    let at = |name: &str| home.path(name);
+    drop(begun(&home, &["record", "synthetic", "--size", "64x48", "--to", "new"], at("new/rgb")));
+    // A line that was being written.
+    for part in names(&at("new")).iter().filter(|name| name.ends_with(".part")) {
+        let mut list = fs::File::options().append(true).open(at("new").join(part)).unwrap();
+        list.write_all(b"9.0 rgb/0000").unwrap();
+    }
+    let before = all(&at("new"));
+    let recording = Recording::open(&at("new"), &Options::default()).unwrap();
+    let frames = recording.len();
+    assert!(frames >= 2 && recording.has_depth());
+    for arguments in [&["stream", "new", "--effect", "none", "--to", "null"][..], &["record", "new", "--to", "copy"]] {
+        let said = home.run(arguments);
+        assert!(said.warning().contains(&format!("new: the recording was interrupted; {frames} frames are played")));
+    }
+    assert_eq!(read(&at("copy")).0, frames);
+    assert_eq!(all(&at("new")), before, "playing changes nothing");
+}
+
+#[test]
+fn a_killed_file_has_the_frames_from_its_first_moment() {
+    let home = Home::new();
+    let args = ["record", "synthetic", "--size", "64x48", "--to", "new.mcap"];
+    let part = || {
+        let found = names(home.0.path()).into_iter().find(|name| name.starts_with(".new.mcap."))?;
+        fs::metadata(home.path(&found)).ok().filter(|part| part.len() > 0)
+    };
+    let run = Beside::start(home.command(&args).stderr(Stdio::null()));
+    until("some bytes", HANG, || part().is_some());
+    drop(run);
+    let once = [&args[..], &["--frames", "1"]].concat();
+    let ran = home.run(&once);
+    assert!(ran.done().contains("kept as new.incomplete.mcap"), "{}", ran.stderr);
+    assert!(Recording::open(&home.path("new.incomplete.mcap"), &Options::default()).unwrap().len() >= 1);
+    // Killed before its first frame: there is nothing to keep.
+    fs::write(home.path(".new.mcap.1-0.part"), "").unwrap();
+    home.run(&[&once[..], &["--force"]].concat()).done();
+    assert_eq!(names(home.0.path()).iter().filter(|name| name.contains("mcap")).count(), 2);
 }
 
 /// A file size limit acts like a full disk.
