@@ -10,6 +10,7 @@ pub mod simd;
 pub mod thread_pool;
 pub mod with_fallback;
 
+use std::any::Any;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -112,6 +113,12 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
     IS_CATCHING.set(before);
     // The payload is leaked, as dropping it may panic again.
     done.map_err(std::mem::forget).ok()
+}
+
+/// Returns the message of a panic from its payload.
+pub fn panic_message(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or(payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }
 
 /// Whether a panic of this thread is inside [`catch_panic`], whose caller reports it: no crash to log.

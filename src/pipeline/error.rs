@@ -3,6 +3,7 @@ use std::io;
 
 use crate::bokeh::BokehError;
 use crate::capture::CaptureError;
+use crate::compute::panic_message;
 use crate::depth::DepthError;
 use crate::sink::SinkError;
 use crate::stats::Report;
@@ -51,11 +52,6 @@ pub enum Fault {
 
 impl Fault {
     pub(super) fn from_panic(stage: &'static str, payload: &(dyn Any + Send)) -> Self {
-        let message = match (payload.downcast_ref::<&str>(), payload.downcast_ref::<String>()) {
-            (Some(text), _) => (*text).to_owned(),
-            (_, Some(text)) => text.clone(),
-            _ => "no message".to_owned(),
-        };
-        Self::Panic { stage, message }
+        Self::Panic { stage, message: panic_message(payload).to_owned() }
     }
 }

@@ -1,17 +1,17 @@
 //! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
 //! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows, and [`MAX_PIXELS`].
-//! Besides the pixels, a PNG needs one row; a JPEG needs twice the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per pixel;
-//! other files need [`MAX_DECODER_BYTES`].
+//! Besides the pixels, a PNG needs one row; a JPEG needs three times the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per
+//! pixel; other files need what `decoders` allows.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-use image::codecs::jpeg::JpegDecoder;
 use image::metadata::Orientation;
-use image::{ColorType, ImageDecoder, ImageFormat, ImageReader};
+use image::{ColorType, ImageDecoder, ImageFormat};
 
+use super::decoders::{create_decoder, create_jpeg_decoder, create_png_decoder, decode_with, guard, sample_format};
 use super::fault::{PictureFault, decoder_fault, open_fault, png_fault};
 use super::file_kind::{self, FileKind};
 use super::heif;
@@ -19,14 +19,11 @@ use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
 use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
-use super::tiff_directory::is_raw_tiff;
-use super::tiff_file::{TiffPhotoDecoder, Undecoded};
-use super::tiff_form::{SAVE_PHOTO, TiffForm};
 use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::files::input;
 
 /// What a message names where no picture is found.
-const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
+pub(super) const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
 
 /// Far more than a photograph of [`MAX_PIXELS`] needs.
 const MAX_JPEG_BYTES: u64 = 192 << 20;
@@ -36,12 +33,6 @@ const MAX_PFM_BYTES: u64 = 4 * MAX_PIXELS + 4096;
 
 /// Part of a JPEG that has its EXIF: a segment of 64 KiB, after those of JFIF and other small ones.
 const MAX_EXIF_START_BYTES: u64 = 256 << 10;
-
-/// Memory limit for a PNG's texts and profiles, which are not shown.
-const MAX_METADATA_BYTES: usize = 64 << 20;
-
-/// Memory limit for other files with their pixels: enough for [`MAX_PIXELS`] of four 16-bit channels.
-const MAX_DECODER_BYTES: u64 = 8 * MAX_PIXELS + (64 << 20);
 
 /// A picture whose header was read.
 pub(super) enum EncodedPicture<'a> {
@@ -54,6 +45,10 @@ pub(super) enum EncodedPicture<'a> {
 impl<'a> EncodedPicture<'a> {
     /// Opens a PNG, JPEG, WebP, TIFF, BMP, GIF (its first frame) or, by an installed program, HEIC; `memory` receives a file that must be read completely.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
+        guard(|| Self::open_unguarded(path, memory))
+    }
+
+    fn open_unguarded(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
         let (mut file, kind) = open_detected(path)?;
         let coded = match kind {
             Some(FileKind::Png) => Self::open_png(file)?,
@@ -61,11 +56,7 @@ impl<'a> EncodedPicture<'a> {
                 let ((width, height), _) = jpeg::read_header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
-                // The decoder would fill missing data with grey.
-                if !jpeg::is_complete(memory) {
-                    return Err(PictureFault::Truncated);
-                }
-                Self::Whole(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(decoder_fault)?))
+                Self::Whole(create_jpeg_decoder(memory)?)
             }
             Some(FileKind::Other(format)) => Self::Whole(create_decoder(file, format)?),
             Some(file_kind::HEIC) => match open_detected(&heif::convert(path)?.picture)? {
@@ -82,14 +73,13 @@ impl<'a> EncodedPicture<'a> {
 
     /// Opens a PNG or JPEG in memory.
     pub(super) fn open_bytes(bytes: &'a [u8]) -> Result<Self, PictureFault> {
-        match FileKind::detect(&bytes[..bytes.len().min(file_kind::START_BYTES)]) {
-            Some(FileKind::Png) => Ok(Self::Whole(decode_with(Cursor::new(bytes), ImageFormat::Png)?)),
-            Some(FileKind::Jpeg) if jpeg::is_complete(bytes) => {
-                Ok(Self::Whole(decode_with(Cursor::new(bytes), ImageFormat::Jpeg)?))
-            }
-            Some(FileKind::Jpeg) => Err(PictureFault::Truncated),
+        let kind = FileKind::detect(&bytes[..bytes.len().min(file_kind::START_BYTES)]);
+        let decoder = guard(|| match kind {
+            Some(FileKind::Png) => decode_with(Cursor::new(bytes), ImageFormat::Png),
+            Some(FileKind::Jpeg) => create_jpeg_decoder(bytes),
             kind => Err(FileKind::fault(kind, "PNG or JPEG")),
-        }
+        });
+        decoder.map(Self::Whole)
     }
 
     fn open_png(file: File) -> Result<Self, PictureFault> {
@@ -100,7 +90,7 @@ impl<'a> EncodedPicture<'a> {
     pub(super) fn icc_profile(&mut self) -> Option<Vec<u8>> {
         match self {
             Self::Png(reader) => reader.info().icc_profile.as_deref().map(<[u8]>::to_vec),
-            Self::Whole(decoder) => decoder.icc_profile().ok().flatten(),
+            Self::Whole(decoder) => guard(|| decoder.icc_profile().map_err(decoder_fault)).ok().flatten(),
         }
     }
 
@@ -125,11 +115,11 @@ impl<'a> EncodedPicture<'a> {
     /// caller checks that the samples are 8-bit RGB.
     pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<PhotoMetadata, PictureFault> {
         match self {
-            Self::Whole(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
+            Self::Whole(mut decoder) if decoder.color_type() == ColorType::Rgb8 => guard(|| {
                 let metadata = PhotoMetadata::from_decoder(&mut *decoder);
                 decoder.read_image(into).map_err(decoder_fault)?;
                 Ok(metadata)
-            }
+            }),
             other => other.decode_runs(memory, |run, row| {
                 if run.step == 1 {
                     into[3 * run.first..][..row.len()].copy_from_slice(row);
@@ -144,6 +134,14 @@ impl<'a> EncodedPicture<'a> {
     /// Decodes the picture and calls `on_run` for every run of pixels with its bytes, in the format of
     /// [`EncodedPicture::samples`]: a row of a PNG, or a whole picture. `memory` is working memory.
     pub(super) fn decode_runs(
+        self,
+        memory: &mut Vec<u8>,
+        on_run: impl FnMut(PixelRun, &[u8]),
+    ) -> Result<PhotoMetadata, PictureFault> {
+        guard(|| self.decode_runs_unguarded(memory, on_run))
+    }
+
+    fn decode_runs_unguarded(
         mut self,
         memory: &mut Vec<u8>,
         mut on_run: impl FnMut(PixelRun, &[u8]),
@@ -184,21 +182,21 @@ impl<'a> EncodedPicture<'a> {
 /// Reads width, height and samples of a picture from its header only.
 pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), PictureFault> {
     let (file, kind) = open_detected(path)?;
-    let (size, samples) = match kind {
+    let (size, samples) = guard(|| match kind {
         Some(FileKind::Png) => {
             let mut decoder = create_png_decoder(file)?;
             let info = decoder.read_header_info().map_err(png_fault)?;
             // A palette is expanded to RGB.
             let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
-            (info.size(), SampleFormat { channels, is_16bit: info.bit_depth == png::BitDepth::Sixteen })
+            Ok((info.size(), SampleFormat { channels, is_16bit: info.bit_depth == png::BitDepth::Sixteen }))
         }
-        Some(FileKind::Jpeg) => jpeg::read_header(&mut BufReader::new(file))?,
+        Some(FileKind::Jpeg) => jpeg::read_header(&mut BufReader::new(file)),
         Some(FileKind::Other(format)) => {
             let decoder = create_decoder(file, format)?;
-            (decoder.dimensions(), sample_format(decoder.color_type()))
+            Ok((decoder.dimensions(), sample_format(decoder.color_type())))
         }
-        _ => return Err(FileKind::fault(kind, PICTURES)),
-    };
+        _ => Err(FileKind::fault(kind, PICTURES)),
+    })?;
     check_size(size.0, size.1)?;
     Ok((size, samples))
 }
@@ -217,7 +215,7 @@ pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFa
     if kind != Some(FileKind::Png) {
         return Err(PictureFault::Format("PNG"));
     }
-    Ok(create_png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
+    guard(|| Ok(create_png_decoder(file)?.read_info().map_err(png_fault)?.info().clone()))
 }
 
 /// Reads a whole JPEG or PNG, to look for parts besides its pixels; the kind only of other files.
@@ -234,20 +232,20 @@ pub(super) fn read_whole(path: &Path) -> Result<(Vec<u8>, Option<FileKind>), Pic
 pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault> {
     let (file, kind) = open_detected(path)?;
     let of_exif = |exif: &[u8]| Orientation::from_exif_chunk(exif);
-    let orientation = match kind {
+    let orientation = guard(|| match kind {
         Some(FileKind::Png) => {
             let info = create_png_decoder(file)?.read_info().map_err(png_fault)?;
-            info.info().exif_metadata.as_deref().and_then(of_exif)
+            Ok(info.info().exif_metadata.as_deref().and_then(of_exif))
         }
         Some(FileKind::Jpeg) => {
             let mut start = Vec::new();
             file.take(MAX_EXIF_START_BYTES).read_to_end(&mut start)?;
-            jpeg::find_exif(&start).and_then(of_exif)
+            Ok(jpeg::find_exif(&start).and_then(of_exif))
         }
-        Some(FileKind::Other(format)) => create_decoder(file, format)?.orientation().ok(),
-        _ => None,
-    };
-    Ok(orientation.unwrap_or(Orientation::NoTransforms))
+        Some(FileKind::Other(format)) => Ok(create_decoder(file, format)?.orientation().ok()),
+        _ => Ok(None),
+    });
+    Ok(orientation?.unwrap_or(Orientation::NoTransforms))
 }
 
 /// Returns the kind of a file by its first bytes; `None` if it is unknown or cannot be read.
@@ -265,47 +263,6 @@ fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> 
         None if b"\x89PNG\r\n\x1a\n".starts_with(&start) => Err(PictureFault::Truncated),
         kind => Ok((file, kind)),
     }
-}
-
-/// Creates a decoder of 8 or 16 bits for a file, whose size is checked.
-fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<dyn ImageDecoder>, PictureFault> {
-    if format != ImageFormat::Tiff {
-        return decode_with(BufReader::new(file), format);
-    }
-    if is_raw_tiff(&mut file)? {
-        return Err(FileKind::fault(Some(file_kind::RAW), PICTURES));
-    }
-    let form = TiffForm::read(&mut file)?;
-    form.check_compression(SAVE_PHOTO)?;
-    let undecoded = Undecoded::read(&mut file);
-    file.rewind()?;
-    let decoder = decode_with(BufReader::new(file), format).map_err(|fault| match fault {
-        PictureFault::Unsupported(_) => form.samples_fault(SAVE_PHOTO),
-        fault => fault,
-    })?;
-    Ok(Box::new(TiffPhotoDecoder { decoder, undecoded }))
-}
-
-/// Creates a decoder of 8 or 16 bits, whose size is checked.
-fn decode_with<'a>(
-    reader: impl BufRead + Seek + 'a,
-    format: ImageFormat,
-) -> Result<Box<dyn ImageDecoder + 'a>, PictureFault> {
-    let mut reader = ImageReader::with_format(reader, format);
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(MAX_DECODER_BYTES);
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(decoder_fault)?;
-    check_size(decoder.dimensions().0, decoder.dimensions().1)?;
-    match sample_format(decoder.color_type()).bytes_per_pixel() == usize::from(decoder.color_type().bytes_per_pixel()) {
-        true => Ok(Box::new(decoder)),
-        false => Err(PictureFault::Unsupported("floating-point samples".into())),
-    }
-}
-
-fn sample_format(color: ColorType) -> SampleFormat {
-    let is_16bit = matches!(color, ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16);
-    SampleFormat { channels: usize::from(color.channel_count()), is_16bit }
 }
 
 fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
@@ -328,14 +285,4 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
     } else {
         Ok(())
     }
-}
-
-fn create_png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault> {
-    let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), png::Limits { bytes: MAX_METADATA_BYTES });
-    // Expands palettes and samples of fewer than 8 bits.
-    decoder.set_transformations(png::Transformations::EXPAND);
-    // Check the size before memory is allocated for a row.
-    let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
-    check_size(width, height)?;
-    Ok(decoder)
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use moxcms::{ColorProfile, ToneReprCurve};
 
 use crate::color::{ToneCurve, ToneCurves};
+use crate::compute::catch_panic;
 
 /// What a profile without usable tone curves means for the blur, for a message.
 pub(super) const NO_CURVES: &str = "its colour profile has tables instead of tone curves, or is damaged; it is kept, and \
@@ -20,6 +21,10 @@ pub(super) fn is_rgb(profile: &[u8]) -> bool {
 
 /// Returns the tone curves of an RGB profile; `None` if it has none.
 pub(super) fn read_tone_curves(profile: &[u8]) -> Option<ToneCurves> {
+    catch_panic(|| read_curves(profile)).flatten()
+}
+
+fn read_curves(profile: &[u8]) -> Option<ToneCurves> {
     let profile = ColorProfile::new_from_slice(profile).ok()?;
     let red = read_curve(profile.red_trc.as_ref()?)?;
     // Most profiles have one curve for all.

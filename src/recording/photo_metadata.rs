@@ -5,6 +5,7 @@ use image::metadata::Orientation;
 
 use super::still::PhotoFormat;
 use super::{icc, image_resources, xmp};
+use crate::compute::catch_panic;
 
 /// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -89,8 +90,8 @@ impl PhotoMetadata {
 
     /// Returns the orientation and removes it from the EXIF: the caller rotates the pixels.
     pub(super) fn take_orientation(&mut self) -> Orientation {
-        let turned = self.exif.as_deref_mut().and_then(Orientation::remove_from_exif_chunk);
-        turned.unwrap_or(Orientation::NoTransforms)
+        let remove = |exif| catch_panic(|| Orientation::remove_from_exif_chunk(exif)).flatten();
+        self.exif.as_deref_mut().and_then(remove).unwrap_or(Orientation::NoTransforms)
     }
 
     /// Removes the EXIF thumbnail, which would still show the original picture.

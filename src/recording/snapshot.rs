@@ -8,6 +8,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::coded;
+use super::decoders::guard;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::fault::png_fault;
@@ -122,16 +123,15 @@ fn parse_settings(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
 /// Reads the settings from a PNG as text. Other programs may have rewritten the iTXt chunk as tEXt or zTXt.
 fn read_text(path: &Path) -> Result<String, PictureFault> {
     let info = coded::read_png_info(path)?;
-    let fault = png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
-        return chunk.get_text().map_err(fault);
+        return guard(|| chunk.get_text().map_err(png_fault));
     }
     // Programs that save the file again may store the text in another kind of chunk.
     let plain = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
     let packed = info.compressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
     match (plain, packed) {
         (Some(chunk), _) => Ok(chunk.text.clone()),
-        (None, Some(chunk)) => chunk.get_text().map_err(fault),
+        (None, Some(chunk)) => guard(|| chunk.get_text().map_err(png_fault)),
         (None, None) => Err(PictureFault::NoSettings),
     }
 }

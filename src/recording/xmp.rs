@@ -7,6 +7,8 @@ use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
+use crate::compute::catch_panic;
+
 /// The keyword of a packet in a PNG.
 pub(super) const PNG_KEYWORD: &str = "XML:com.adobe.xmp";
 /// Identifier at the start of a JPEG segment with a packet.
@@ -66,7 +68,8 @@ pub(super) fn parse(packet: &[u8]) -> Option<Document<'_>> {
     }
     let text = std::str::from_utf8(packet).ok()?.trim_matches(['\0', '\u{feff}', ' ', '\t', '\r', '\n']);
     // Without DTD, there are no entities to expand.
-    Document::parse_with_options(text, ParsingOptions { allow_dtd: false, ..ParsingOptions::default() }).ok()
+    let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
+    catch_panic(|| Document::parse_with_options(text, options).ok()).flatten()
 }
 
 /// Returns the packet for a picture that is upright and alone in its file.

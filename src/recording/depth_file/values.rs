@@ -10,6 +10,7 @@ use super::{FORMATS, exr, npy, tiff};
 use crate::files::input;
 use crate::recording::MAX_PIXELS;
 use crate::recording::coded::{self, EncodedPicture};
+use crate::recording::decoders::guard;
 use crate::recording::fault::{PictureFault, open_fault};
 use crate::recording::pfm;
 use crate::recording::photo_metadata::PhotoMetadata;
@@ -82,10 +83,10 @@ pub(super) fn read(path: &Path) -> Result<Values, PictureFault> {
             Ok(values)
         }
         [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => npy::parse(&read_whole(file)?),
-        [b'P', b'K', 3, 4, ..] => npy::read_archive(file, MAX_FLOATS_BYTES),
+        [b'P', b'K', 3, 4, ..] => guard(|| npy::read_archive(file, MAX_FLOATS_BYTES)),
         // 43 is BigTIFF.
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => tiff::read(file),
-        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read(file),
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => guard(|| tiff::read(file)),
+        [0x76, 0x2f, 0x31, 0x01, ..] => guard(|| exr::read(file)),
         [] => Err(PictureFault::Truncated),
         _ => read_codes(path),
     }

@@ -6,6 +6,7 @@ use std::cmp::Ordering;
 use std::io::Cursor;
 
 use super::super::{coded, jpeg, xmp};
+use crate::compute::catch_panic;
 
 /// Identifier at the start of a JPEG segment with a piece of Extended XMP. After it: GUID (32 bytes), length of the whole
 /// and position of the piece (4 bytes each, big-endian), and the piece.
@@ -40,7 +41,10 @@ impl<'a> Packets<'a> {
     pub(super) fn read(file: &'a [u8]) -> Self {
         match file.starts_with(b"\xFF\xD8\xFF") {
             true => Self::read_jpeg(file),
-            false => Self { packets: read_png(file).map(Cow::Owned).into_iter().collect(), is_incomplete: false },
+            false => {
+                let packet = catch_panic(|| read_png(file)).flatten();
+                Self { packets: packet.map(Cow::Owned).into_iter().collect(), is_incomplete: false }
+            }
         }
     }
 

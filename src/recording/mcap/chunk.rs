@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lz4_flex::frame::FrameDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
+use crate::recording::decoders::guard;
 use crate::recording::fault::PictureFault;
 
 /// Largest chunk that is decompressed: far more than recorders collect, and enough for the largest picture.
@@ -58,14 +59,16 @@ impl Chunk {
     pub fn read(&self, file: &File) -> Result<Vec<u8>, PictureFault> {
         let mut coded = BufReader::new(Part { file, at: self.at, end: self.at + self.coded_bytes });
         let mut bytes = Vec::new();
-        let read = match self.compression {
-            Compression::Lz4 => FrameDecoder::new(coded).take(self.bytes + 1).read_to_end(&mut bytes),
-            Compression::Zstd => StreamingDecoder::new(&mut coded)
-                .map_err(|error| io::Error::other(error.to_string()))
-                .and_then(|decoder| decoder.take(self.bytes + 1).read_to_end(&mut bytes)),
-        };
         let damaged = |what: &str| PictureFault::Damaged(what.replace('\n', " "));
-        read.map_err(|error| damaged(&error.to_string()))?;
+        guard(|| {
+            let read = match self.compression {
+                Compression::Lz4 => FrameDecoder::new(coded).take(self.bytes + 1).read_to_end(&mut bytes),
+                Compression::Zstd => StreamingDecoder::new(&mut coded)
+                    .map_err(|error| io::Error::other(error.to_string()))
+                    .and_then(|decoder| decoder.take(self.bytes + 1).read_to_end(&mut bytes)),
+            };
+            read.map_err(|error| damaged(&error.to_string()))
+        })?;
         if bytes.len() as u64 != self.bytes {
             return Err(damaged("its length is wrong"));
         }

@@ -16,6 +16,7 @@ use super::coded::EncodedPicture;
 use super::container::Container;
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::decode::{self, DepthUnits, Scratch};
+use super::decoders::{guard, guard_as};
 use super::error::RecordingError;
 use super::fault::{PictureFault, damaged_fault};
 use super::list::MAX_ENTRIES;
@@ -44,16 +45,14 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let path = &folder.dir;
     let fault = |what: String| RecordingError::File { path: path.clone(), what };
     let file = input::open(path).map_err(RecordingError::io("open the recording", path))?;
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|error| {
-        fault(format!(
-            "not a whole recording of Record3D, which is a zip ({}); copy it again",
-            error.to_string().replace('\n', " ")
-        ))
+    let zip = guard_as(From::from, || ZipArchive::new(BufReader::new(file)).map_err(|error| error.to_string()));
+    let mut archive = zip.map_err(|what| {
+        fault(format!("not a whole recording of Record3D, which is a zip ({}); copy it again", what.replace('\n', " ")))
     })?;
     if archive.len() > 4 * MAX_ENTRIES {
         return Err(fault(format!("it has {} files, too many; split it", archive.len())));
     }
-    let metadata = Metadata::read(&mut archive).map_err(fault)?;
+    let metadata = guard_as(From::from, || Metadata::read(&mut archive)).map_err(fault)?;
 
     // Colour and depth of each number.
     let mut numbered: BTreeMap<u32, [Option<String>; 2]> = BTreeMap::new();
@@ -118,12 +117,13 @@ impl Archive {
     fn read<'a>(&self, name: &str, bytes: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
         let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
         bytes.clear();
-        let entry = archive.by_name(name).map_err(|error| damaged_fault(&error))?;
-        if entry.size() > MAX_PICTURE_BYTES {
-            return Err(PictureFault::FileSize { bytes: entry.size(), max_bytes: MAX_PICTURE_BYTES });
-        }
-        let read = entry.take(MAX_PICTURE_BYTES).read_to_end(bytes);
-        read.map_err(|error| damaged_fault(&error))?;
+        guard(|| {
+            let entry = archive.by_name(name).map_err(|error| damaged_fault(&error))?;
+            if entry.size() > MAX_PICTURE_BYTES {
+                return Err(PictureFault::FileSize { bytes: entry.size(), max_bytes: MAX_PICTURE_BYTES });
+            }
+            entry.take(MAX_PICTURE_BYTES).read_to_end(bytes).map_err(|error| damaged_fault(&error))
+        })?;
         Ok(bytes)
     }
 
@@ -162,9 +162,11 @@ impl Container for Archive {
         let name = self.frames[frame].1.as_ref().ok_or(PictureFault::Missing)?;
         let coded = self.read(name, &mut scratch.file)?;
         scratch.pixels.clear();
-        let mut decoder = LzfseRingDecoder::default();
-        let decoded = decoder.reader_bytes(coded).take(MAX_DEPTH_BYTES).read_to_end(&mut scratch.pixels);
-        decoded.map_err(|error| damaged_fault(&error))?;
+        guard(|| {
+            let mut decoder = LzfseRingDecoder::default();
+            let decoded = decoder.reader_bytes(coded).take(MAX_DEPTH_BYTES).read_to_end(&mut scratch.pixels);
+            decoded.map_err(|error| damaged_fault(&error))
+        })?;
         let values = scratch.pixels.as_chunks::<4>().0;
         let (width, height) = self
             .find_depth_size(values.len(), size)
