@@ -1,12 +1,14 @@
 //! Errors between the arguments and the pipeline.
 
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bokehcam::bokeh::BokehError;
 use bokehcam::calibration::CalibrationError;
 use bokehcam::capture::CaptureError;
+use bokehcam::compute::panic_message;
 use bokehcam::depth::DepthError;
 use bokehcam::files::input;
 use bokehcam::look::LookError;
@@ -78,6 +80,9 @@ pub enum CliError {
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),
+    /// A part of the program panicked.
+    #[error("a fault in bokehcam: {0}; please report this")]
+    Panic(String),
     /// The signal handler cannot be set.
     #[error("signals cannot be handled: {0}")]
     Signals(String),
@@ -138,6 +143,12 @@ impl From<RecordingError> for CliError {
 }
 
 impl CliError {
+    /// Does a part of a command. A panic becomes an error, so that what is whole can still be finished.
+    pub fn catch_panic<T>(work: impl FnOnce() -> Result<T, Self>) -> Result<T, Self> {
+        let done = catch_unwind(AssertUnwindSafe(work));
+        done.unwrap_or_else(|panic| Err(Self::Panic(panic_message(&*panic).to_owned())))
+    }
+
     /// Returns a converter for `map_err` that adds the file's path to an I/O error.
     pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();

@@ -43,7 +43,15 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     bokehcam_lab::synthetic::register();
     log::install_panic_hook();
     log::set_format(arguments::log_format(&args));
-    let code = run_command(&args);
+    finish(|| run_command(&args))
+}
+
+/// Runs a command, and waits until all is printed, also after a panic.
+fn finish(command: impl FnOnce() -> ExitCode) -> ExitCode {
+    let code = CliError::catch_panic(|| Ok(command())).unwrap_or_else(|error| {
+        log::error(&error.to_string());
+        error.exit_code()
+    });
     log::flush();
     code
 }
@@ -76,6 +84,22 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
+
+    /// Panics in a child process, the test program itself: only there is nothing printed after `finish`.
+    #[test]
+    fn a_panic_of_the_main_thread_is_printed() {
+        const IS_CHILD: &str = "TEST_OF_A_PANIC";
+        if std::env::var_os(IS_CHILD).is_some() {
+            log::install_panic_hook();
+            finish(|| panic!("of this test"));
+            std::process::exit(0);
+        }
+        let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+        child.args(["--exact", "tests::a_panic_of_the_main_thread_is_printed", "--nocapture"]).env(IS_CHILD, "");
+        let printed = String::from_utf8(child.output().unwrap().stderr).unwrap();
+        assert!(printed.contains("lib.rs") && printed.contains("\nof this test\n"), "{printed}");
+        assert!(printed.ends_with("error: a fault in bokehcam: of this test; please report this\n"), "{printed}");
+    }
 
     #[test]
     fn the_definition_is_consistent() {

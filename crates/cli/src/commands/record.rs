@@ -96,7 +96,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     // Matched depth does not depend on --depth-scale; other depth is doubted once.
     let (mut lost, mut skip_check) = (0, rig.is_some());
-    let mut record_frames = || -> Result<bool, CliError> {
+    let record_frames = || -> Result<bool, CliError> {
         while !stop.load(Ordering::Relaxed) {
             let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
                 Captured::Frame(stamp) => stamp,
@@ -128,8 +128,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
         // A camera is endless: stopping it is its regular end.
         Ok(info.live || info.frames.is_none())
     };
-    // On errors, the frames recorded so far are kept below.
-    let outcome = record_frames();
+    // On errors and panics, the frames recorded so far are kept below.
+    let outcome = CliError::catch_panic(record_frames);
     drop(progress);
     if lost > 0 {
         tracing::warn!("{lost} frames were lost because writing was too slow");

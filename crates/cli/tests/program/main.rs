@@ -17,6 +17,7 @@ mod behind;
 mod cli;
 mod colors;
 mod ctl;
+mod damage;
 #[cfg(feature = "lab")]
 mod debug_dir;
 #[cfg(feature = "gpu")]

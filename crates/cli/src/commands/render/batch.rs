@@ -183,9 +183,11 @@ fn process(
     look: &Look,
     given: &GivenSettings,
 ) -> Outcome {
-    let rendered = refuse_overwrite([picture.target.as_path()], command.output.force)
-        .and_then(|()| maps.command_for(command, picture))
-        .and_then(|command| render(&command, look, given));
+    // A panic fails this picture only.
+    let rendered = CliError::catch_panic(|| {
+        refuse_overwrite([picture.target.as_path()], command.output.force)?;
+        render(&maps.command_for(command, picture)?, look, given)
+    });
     let changed = |path: &Path| fs::metadata(path).and_then(|file| file.modified()).ok();
     match rendered {
         Ok(rendered) => Outcome::Written(rendered),
