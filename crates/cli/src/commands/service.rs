@@ -47,6 +47,8 @@ enum What {
 /// The unit file of the packages, and the program in it.
 const UNIT: &str = include_str!("../../../../packaging/bokehcam.service");
 const PROGRAM: &str = "/usr/bin/bokehcam";
+/// Begin of the line in it with the default arguments of `bokehcam stream`.
+const DEFAULT: &str = "Environment=\"STREAM=";
 /// Maximum size of stream.conf, in bytes.
 const MAX_BYTES: u64 = 64 * 1024;
 /// A stream that cannot start fails within this time.
@@ -66,6 +68,11 @@ pub fn run(command: &ServiceCommand) -> Result<(), CliError> {
         What::Off => disable(&Unit::query()?),
         What::Status => print_status(&Unit::query()?),
     }
+}
+
+/// Returns the default arguments of `bokehcam stream`, as the packages' unit has them.
+fn default_stream_arguments() -> &'static str {
+    UNIT.lines().find_map(|line| line.strip_prefix(DEFAULT)).map_or("", |arguments| arguments.trim_end_matches('"'))
 }
 
 fn enable(mut unit: Unit) -> Result<(), CliError> {
@@ -183,7 +190,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_unit_starts_one_program() {
-        assert_eq!(UNIT.matches(&format!("ExecStart={PROGRAM} ")).count(), 1);
+    fn the_unit_starts_one_program_with_the_arguments_of_one_line() {
+        assert_eq!(UNIT.matches(&format!("ExecStart={PROGRAM} stream --tray $STREAM\n")).count(), 1);
+        assert_eq!(UNIT.matches(DEFAULT).count(), 1);
+        assert!(!default_stream_arguments().is_empty());
     }
 }

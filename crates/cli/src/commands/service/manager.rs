@@ -106,11 +106,13 @@ fn query_properties(unit: &str) -> Result<HashMap<String, String>, CliError> {
 
 /// Runs `systemctl --user` and returns its output.
 fn read_systemctl(args: &[&str]) -> Result<String, CliError> {
-    const INSTEAD: &str =
-        "let your desktop start `bokehcam stream 0 --to pipewire --on-demand` with the session instead";
+    let instead = || {
+        let arguments = super::default_stream_arguments();
+        format!("let your desktop start `bokehcam stream {arguments}` with the session instead")
+    };
     let output = Command::new("systemctl").arg("--user").args(args).stdin(Stdio::null()).output();
     let Output { status, stdout, stderr } = output.map_err(|error| match error.kind() {
-        ErrorKind::NotFound => CliError::Service(format!("there is no systemd here: {INSTEAD}")),
+        ErrorKind::NotFound => CliError::Service(format!("there is no systemd here: {}", instead())),
         _ => CliError::io("systemctl".as_ref())(error),
     })?;
     if status.success() {
@@ -120,7 +122,7 @@ fn read_systemctl(args: &[&str]) -> Result<String, CliError> {
     let said = said.lines().find(|line| !line.trim().is_empty()).unwrap_or("it gives no reason").to_owned();
     Err(CliError::Service(match args {
         // Queries fail only without a user session.
-        ["show", ..] => format!("this user has no systemd session ({said}): {INSTEAD}"),
+        ["show", ..] => format!("this user has no systemd session ({said}): {}", instead()),
         _ => format!("systemctl --user {}: {said}", args.join(" ")),
     }))
 }

@@ -21,7 +21,7 @@ show)
     echo "FragmentPath=$own"
     program=$(sed -n 's/^ExecStart="\{0,1\}\([^ "]*\).*/\1/p' "$own")
     echo "ExecStart={ path=$program ; argv[]=$program stream \$STREAM ; ignore_errors=no }"
-    echo 'Environment="STREAM=0 --to /dev/video10 --on-demand"' ;;
+    grep '^Environment=' "$own" ;;
 daemon-reload) grep -q '^ExecStart=' "$own" && echo loaded >"$here/loaded"; exit 0 ;;
 enable) echo enabled >"$here/enabled"; cp "$here/becomes" "$here/active" ;;
 disable) rm -f "$here/enabled" "$here/active" ;;
@@ -69,6 +69,35 @@ impl Session {
     }
 }
 
+/// Returns the arguments of `bokehcam stream` in the packages' unit.
+fn unit_arguments() -> String {
+    let unit = fs::read_to_string(Path::new(ROOT).join("packaging/bokehcam.service")).unwrap();
+    let line = unit.lines().find_map(|line| line.strip_prefix("Environment=\"STREAM=")).unwrap();
+    line.strip_suffix('"').unwrap().to_owned()
+}
+
+#[test]
+fn the_units_command_line_is_the_promised_one_and_works() {
+    let arguments = unit_arguments();
+    assert_eq!(arguments, "0 --to pipewire --on-demand");
+    for page in ["README.md", "docs/call.md"] {
+        let text = fs::read_to_string(Path::new(ROOT).join(page)).unwrap();
+        assert!(text.contains(&format!("bokehcam stream {arguments}")), "{page}");
+    }
+    let home = Home::new();
+    let stream = |arguments: &str| {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        home.run(&[&["stream", "--tray"], &arguments[..]].concat())
+    };
+    // There is no PipeWire here, and mostly no camera: both may come, so systemd tries again (not for exit code 2).
+    assert_eq!(stream(&arguments).code, 1);
+    if cfg!(feature = "pipewire") {
+        let (source, rest) = arguments.split_once(' ').unwrap();
+        assert_eq!(source, "0");
+        stream(&format!("demo {rest}")).failed(1, &["PipeWire cannot be reached"]);
+    }
+}
+
 #[test]
 fn one_word_starts_it_with_every_session_and_one_ends_that() {
     let session = Session::new("active");
@@ -81,7 +110,8 @@ fn one_word_starts_it_with_every_session_and_one_ends_that() {
         (on.code, session.told()),
         (0, vec!["--user daemon-reload".into(), "--user enable --now bokehcam.service".into()])
     );
-    assert!(on.stdout.starts_with("on: it runs\n  streams   0 --to /dev/video10 --on-demand\n"), "{}", on.stdout);
+    let streams = format!("on: it runs\n  streams   {}\n", unit_arguments());
+    assert!(on.stdout.starts_with(&streams), "{}", on.stdout);
     assert!(on.stdout.contains("bokehcam/stream.conf"), "{}", on.stdout);
     // The written unit is the packaged one with the path of this program.
     let packaged = fs::read_to_string(Path::new(ROOT).join("packaging/bokehcam.service")).unwrap();
