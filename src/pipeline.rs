@@ -41,7 +41,7 @@ use crate::clock::{self, Clock};
 use crate::engine::{Blur, Engine};
 use crate::link::{self, Receiver, Sender};
 use crate::sink::{self, Ending};
-use crate::stats::{EnergyMeter, FrameCounter, Report, RunInfo, Timings};
+use crate::stats::{EnergyMeter, FrameCounter, LiveSource, Report, RunInfo, Timings};
 
 /// State shared by all stages of a run.
 struct Shared {
@@ -95,7 +95,7 @@ impl Shared {
 /// Returns the fault of the stage that failed, a panic included, with the report. The output then has the frames
 /// delivered so far.
 pub fn run(mut run: Run) -> Result<Report, PipelineError> {
-    let (began_ns, cpu_ns, energy) = (run.clock.now_ns(), clock::process_cpu_ns(), EnergyMeter::start());
+    let (began_ns, cpu_ns, energy) = (run.clock.now_ns(), clock::program_cpu_ns(), EnergyMeter::start());
     let Engine { preprocessor, blur } = run.create_engine();
     let shared = Shared::new(&run, &blur);
     let Shared { info, counter, has_ended, .. } = &shared;
@@ -138,8 +138,9 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         outputs: sink::read_counters(&outputs),
         pipewire: sink::read_counters(&nodes),
         elapsed_ns: shared.clock.now_ns() - began_ns,
-        cpu_ns: clock::process_cpu_ns() - cpu_ns,
+        cpu_ns: clock::program_cpu_ns() - cpu_ns,
         energy_j: Some(energy.joules()),
+        live: info.live.then(|| LiveSource { size: info.size, fps: 1e9 / info.period_ns as f64 }),
         ..about
     };
     let report = Report::new(counter.frame_counts(), &timings, about);

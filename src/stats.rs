@@ -17,7 +17,7 @@ pub use frame_rate::FrameRateMeter;
 pub use histogram::{Histogram, PassHistograms};
 pub use output_counts::{NodeCounts, OutputCounts};
 pub use quality_counts::QualityCounts;
-pub use report::{Percentiles, QualityStats, Report, RunInfo, StageMs, StagesMs, Versions, WindowStats};
+pub use report::{LiveSource, Percentiles, QualityStats, Report, RunInfo, StageMs, StagesMs, Versions, WindowStats};
 
 /// Measurements of the stages during a run; each stage fills its own part.
 #[derive(Clone, Debug, Default)]

@@ -25,6 +25,17 @@ pub struct RunInfo {
     pub outputs: Vec<OutputCounts>,
     /// The PipeWire cameras.
     pub pipewire: Vec<NodeCounts>,
+    /// The source, if its frames arrive at their own pace.
+    pub live: Option<LiveSource>,
+}
+
+/// A source whose frames arrive at their own pace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiveSource {
+    /// Width and height of its frames, in pixels.
+    pub size: (u32, u32),
+    /// Frames per second.
+    pub fps: f64,
 }
 
 /// The report (`--report`). Times are in milliseconds.
@@ -64,7 +75,7 @@ pub struct Report {
     pub sink: String,
     /// Wall time of the run, in seconds.
     pub elapsed_s: f64,
-    /// CPU time of the program meanwhile, all threads together, in seconds.
+    /// CPU time of the program meanwhile in seconds: all threads, and child processes that have ended, such as ffmpeg.
     pub cpu_s: f64,
     /// Energy of the processor meanwhile, other programs included, in joules.
     pub energy_j: Option<f64>,
@@ -82,6 +93,9 @@ pub struct Report {
     pub window: Option<WindowStats>,
     /// The versions that produced this report.
     pub versions: Versions,
+    /// The source, if its frames arrive at their own pace.
+    #[serde(skip)]
+    pub live: Option<LiveSource>,
 }
 
 /// Frames that a window showed, and their latencies.
@@ -210,6 +224,7 @@ impl Report {
                 bokehcam: env!("CARGO_PKG_VERSION"),
                 platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             },
+            live: info.live,
         }
     }
 
@@ -253,71 +268,4 @@ impl Serialize for QualityStats {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::stats::{DropCause, FrameCounter};
-
-    fn report() -> Report {
-        let counter = FrameCounter::new();
-        let mut timings = Timings::default();
-        for frame in 0..10u64 {
-            let ticket = counter.count_captured(frame);
-            timings.decode.add(2_000_000);
-            timings.blur.took.add(12_000_000);
-            timings.blur.passes.add("rows", 7_000_000);
-            timings.sink.latency.add(30_000_000 + frame);
-            counter.count_delivered(ticket);
-        }
-        for level in ["fast", "balanced", "balanced", "balanced"] {
-            timings.blur.quality_counts.add(level);
-        }
-        counter.count_lost(3, DropCause::Late);
-        let info =
-            RunInfo { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..RunInfo::default() };
-        Report::new(counter.frame_counts(), &timings, info)
-    }
-
-    #[test]
-    fn the_json_has_the_documented_form() {
-        let mut text = Vec::new();
-        report().write_json(&mut text).unwrap();
-        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
-        assert_eq!(json["frames"]["captured"], 13);
-        assert_eq!(json["frames"]["dropped"]["late"], 3);
-        assert_eq!(json["frames"]["in_flight"], 0);
-        assert!((json["latency_ms"]["p95"].as_f64().unwrap() - 30.0).abs() < 0.3);
-        assert!(json["frame_ms"].is_null(), "nothing measured is not zero");
-        assert!((json["stages_ms"]["blur.rows"]["p99"].as_f64().unwrap() - 7.0).abs() < 0.07);
-        assert!(json["stages_ms"]["depth"].is_null(), "no stage that did nothing");
-        assert_eq!(json["quality"]["balanced"], 0.75);
-        assert_eq!(json["quality"]["switches"], 1);
-        assert_eq!(
-            (&json["budget_ms"], &json["elapsed_s"], &json["cpu_s"]),
-            (&33.333.into(), &0.5.into(), &0.25.into())
-        );
-        for key in ["misses", "backend", "adapter", "refined_by", "matted_by", "source", "sink", "versions"] {
-            assert!(!json[key].is_null(), "{key}");
-        }
-    }
-
-    #[test]
-    fn the_summary_names_what_was_lost() {
-        let text = report().to_string();
-        assert!(text.starts_with("10 of 13 frames delivered in 0.50 s (20.0 per second), 3 late\n"), "{text}");
-        assert!(!text.contains("blur.rows"));
-        assert!(text.ends_with("\nquality: fast 25 %, balanced 75 %; 1 changes"), "{text}");
-    }
-
-    #[test]
-    fn a_run_without_a_frame_and_one_of_one_frame_have_reports() {
-        let mut timings = Timings::default();
-        let empty = Report::new(FrameCounts::default(), &timings, RunInfo::default());
-        let mut text = Vec::new();
-        empty.write_json(&mut text).unwrap();
-        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
-        assert_eq!((&json["quality"], json["latency_ms"].is_null()), (&serde_json::json!({ "switches": 0 }), true));
-        timings.sink.latency.add(5_000_000);
-        let latency_ms = Report::new(FrameCounts::default(), &timings, RunInfo::default()).latency_ms;
-        assert_eq!(latency_ms, Some(Percentiles { p50: 5.0, p95: 5.0, p99: 5.0, max: 5.0 }));
-    }
-}
+mod tests;

@@ -3,7 +3,48 @@
 use std::fmt;
 
 use super::FrameCounts;
-use super::report::{Percentiles, Report, StageMs};
+use super::report::{LiveSource, Percentiles, Report, StageMs};
+
+/// A picture of this size, in pixels, is blurred in real time by any machine that is sold today.
+const SMALL: (u32, u32) = (640, 480);
+
+impl Report {
+    /// Returns the outcome in plain words: how many frames were delivered, and what to do if the machine was too slow.
+    /// [`Display`](fmt::Display) has all counts and times.
+    pub fn outcome(&self) -> String {
+        let FrameCounts { captured, delivered, dropped, .. } = &self.frames;
+        let mut text = format!("{delivered} of {captured} frames delivered in {:.2} s", self.elapsed_s);
+        let faults =
+            [(dropped.corrupt, "damaged"), (dropped.unpaired, "without a counterpart"), (dropped.failed, "failed")];
+        for (count, what) in faults.iter().filter(|(count, _)| *count > 0) {
+            text += &format!(", {count} {what}");
+        }
+        let lossy = self.outputs.iter().filter(|output| output.lost > 0).map(ToString::to_string);
+        self.describe_slowness().into_iter().chain(lossy).fold(text, |text, line| text + "\n" + &line)
+    }
+
+    /// Says how many frames a slow machine showed and what to do, if a tenth of those of a live source was lost.
+    fn describe_slowness(&self) -> Option<String> {
+        let FrameCounts { captured, dropped, .. } = &self.frames;
+        let lost = dropped.driver + dropped.evicted + dropped.late;
+        let LiveSource { size, fps } = self.live.filter(|_| 10 * lost > *captured)?;
+        let is_draft = self.quality.fractions.iter().any(|(level, fraction)| *level == "draft" && *fraction > 0.9);
+        let remedies = [
+            (u64::from(size.0) * u64::from(size.1) > u64::from(SMALL.0) * u64::from(SMALL.1))
+                .then(|| format!("--size {}x{}", SMALL.0, SMALL.1)),
+            (!is_draft).then(|| "--quality draft".to_owned()),
+            Some(format!("--fps {:.0}", (fps / 2.0).max(1.0))),
+        ];
+        let remedies: Vec<String> = remedies.into_iter().flatten().take(2).collect();
+        let shown_fps = fps * (1.0 - lost as f64 / *captured as f64);
+        Some(format!(
+            "{shown_fps:.0} of {fps:.0} frames a second were shown: this machine is too slow for {}x{}; try {}",
+            size.0,
+            size.1,
+            remedies.join(" or ")
+        ))
+    }
+}
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use super::error::CliError;
-use super::files::refuse_overwrite;
+use super::files::{create_parent_folder, refuse_overwrite};
 use super::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::atomic_file::PartFile;
 use bokehcam::files::place;
@@ -45,14 +45,17 @@ pub fn check_path(path: Option<&Path>, force: bool, targets: &[Target]) -> Resul
     ))
 }
 
-/// Checks before a run that its report can be written.
+/// Checks before a run that its report can be written; creates its folder.
 ///
 /// # Errors
-/// Fails if its folder cannot be written.
+/// Fails if its folder cannot be created or written.
 pub fn check_writable(path: Option<&Path>) -> Result<(), CliError> {
     match path {
         // Uses a part file next to it: opening the path itself would disturb the reader of a pipe.
-        Some(path) if path != STDOUT => PartFile::create(path).map(drop).map_err(CliError::io(path)),
+        Some(path) if path != STDOUT => {
+            create_parent_folder(path)?;
+            PartFile::create(path).map(drop).map_err(CliError::io(path))
+        }
         _ => Ok(()),
     }
 }

@@ -134,11 +134,10 @@ impl Guidance {
     }
 }
 
-/// Prints the report of a run; with `--verbose`, the times of its stages, too.
+/// Prints the outcome of a run; with `--verbose`, all counts and times of its report.
 pub fn print_report(report: &Report, global: &Global) {
-    let is_shown = |line: &&str| global.verbose > 0 || !line.contains(" ms: ");
     if !global.quiet {
-        print_to_stderr(&report.to_string().lines().filter(is_shown).collect::<Vec<_>>().join("\n"));
+        print_to_stderr(&if global.verbose > 0 { report.to_string() } else { report.outcome() });
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::program::{Home, PROGRAM, Ran};
+use crate::program::{Home, PROGRAM, Ran, json};
 
 /// Returns a home with a clip of two seconds and 40 frames, with sound.
 fn home_with_clip() -> Home {
@@ -204,4 +204,20 @@ fn a_list_of_videos_is_not_read_whatever_its_name() {
         let ran = home.run(&["stream", name, "--effect", "none", "--to", "null"]);
         assert!(ran.code == 0, "{name}: {}", ran.stderr);
     }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn the_processor_time_of_ffmpeg_is_in_the_report() {
+    let home = home_with_clip();
+    let cpu_s = |path: &str, name: &str| {
+        let args = ["stream", "clip.mp4", "--effect", "none", "--to", "null", "--report", name];
+        Ran::of(home.command(&args).env("PATH", path)).done();
+        json(home.path(name))["cpu_s"].as_f64().unwrap()
+    };
+    let usual_s = cpu_s(&std::env::var("PATH").unwrap(), "usual.json");
+    let ffmpeg = Ran::of(Command::new("sh").args(["-c", "command -v ffmpeg"])).printed();
+    let work = "i=0; while [ $i -lt 1000000 ]; do i=$((i+1)); done";
+    let slow_s = cpu_s(&home.add_program("ffmpeg", &format!("{work}; exec {} \"$@\"", ffmpeg.trim())), "slow.json");
+    assert!(slow_s > usual_s + 0.2, "{slow_s} s with an ffmpeg that works for long, {usual_s} s without");
 }

@@ -12,8 +12,12 @@ fn a_report_and_a_sink_never_share_a_place() {
     for (to, report) in [("x.y4m", "x.y4m"), ("x.y4m", "./self/../x.y4m"), ("x.mkv", "x.mkv")] {
         home.sh(&format!("stream self --to {to} --report {report}")).failed(2, &["writes to it, too"]);
     }
-    home.sh(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, &["nowhere/r.json"]);
+    fs::write(home.path("file"), "").unwrap();
+    home.sh(&format!("stream self {BLUR} --to x.y4m --report file/r.json")).failed(1, &["file"]);
     assert!(!home.path("x.y4m").exists(), "it is known before the run");
+    // Its folder is made, as that of other outputs.
+    assert_eq!(home.sh(&format!("stream self {BLUR} --to x.y4m --report new/folder/r.json -q")).code, 0);
+    assert!(home.path("new/folder/r.json").is_file());
 }
 
 #[test]
