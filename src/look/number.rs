@@ -22,7 +22,9 @@ pub fn in_range_parser(
 /// # Errors
 /// `text` is not such a number.
 pub fn parse_positive(text: &str) -> Result<f32, String> {
-    parse_in_range(text, 0.0, f32::MAX).filter(|number| *number > 0.0).ok_or_else(|| "use a number above 0".to_string())
+    parse_in_range(text, 0.0, f32::MAX)
+        .filter(|number| *number > 0.0)
+        .ok_or_else(|| describe_finite(text, "use a number above 0"))
 }
 
 /// Parses a finite number from 0.
@@ -30,7 +32,43 @@ pub fn parse_positive(text: &str) -> Result<f32, String> {
 /// # Errors
 /// `text` is not such a number.
 pub fn parse_non_negative(text: &str) -> Result<f32, String> {
-    parse_in_range(text, 0.0, f32::MAX).ok_or_else(|| "use a number from 0".to_string())
+    parse_in_range(text, 0.0, f32::MAX).ok_or_else(|| describe_finite(text, "use a number from 0"))
+}
+
+/// Returns what is accepted instead of `text`: also the largest number, if that is exceeded.
+fn describe_finite(text: &str, accepted: &str) -> String {
+    let is_too_large = text.trim().parse().is_ok_and(|number: f32| number == f32::INFINITY);
+    if is_too_large { format!("{accepted}, up to {:e}", f32::MAX) } else { accepted.to_owned() }
+}
+
+/// Returns a parser of whole numbers within `range`, ends included.
+pub fn whole_number_parser<T: FromStr + PartialOrd + fmt::Display + Clone + Send + Sync + 'static>(
+    range: RangeInclusive<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("use a whole number from {} to {}", range.start(), range.end()))
+    }
+}
+
+/// Parses a whole number of things, at least one.
+///
+/// # Errors
+/// `text` is not such a number.
+pub fn parse_count<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T, String> {
+    text.trim().parse().ok().filter(|count| *count >= T::from(1)).ok_or_else(|| "use a whole number from 1".to_owned())
+}
+
+/// Parses the value of a switch: true or false, and other words for them.
+///
+/// # Errors
+/// `text` is none of these words.
+pub fn parse_switch(text: &str) -> Result<bool, String> {
+    match text.trim().to_lowercase().as_str() {
+        "true" | "t" | "yes" | "y" | "on" | "1" => Ok(true),
+        "false" | "f" | "no" | "n" | "off" | "0" => Ok(false),
+        _ => Err("use true or false".to_owned()),
+    }
 }
 
 /// A value, or `auto`, which the picture or the quality level determines.

@@ -11,14 +11,12 @@ use std::str::FromStr;
 
 #[cfg(feature = "clap")]
 use clap::Args;
-#[cfg(feature = "clap")]
-use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 
 use super::video::is_video;
 #[cfg(feature = "clap")]
 use crate::depth::stereo::Settings;
 #[cfg(feature = "clap")]
-use crate::look::number::{in_range_parser, parse_positive};
+use crate::look::number::{in_range_parser, parse_count, parse_positive, parse_switch, whole_number_parser};
 #[cfg(feature = "clap")]
 use crate::names;
 use crate::recording::depth_file::{self, Fit};
@@ -50,11 +48,10 @@ pub struct Frames {
     pub end: Option<f64>,
     /// Start again at the end of the source; the run ends only by --frames or Ctrl-C
     #[cfg_attr(feature = "clap", arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true))]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub repeat: bool,
     /// Stop after this many frames
-    #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..)))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = parse_count::<u64>))]
     pub frames: Option<u64>,
     /// Picture size; for a camera, its nearest size; for single scenes of several sizes (KITTI), which of them [default:
     /// 1280x720 for a camera, 640x480 for `synthetic`; `demo` has its own]
@@ -69,8 +66,7 @@ pub struct Frames {
     pub topic: Vec<String>,
     /// Read recordings whose links lead outside their folder
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true))]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub follow_links: bool,
     /// How the pictures are turned, flipped and cut.
     #[cfg_attr(feature = "clap", command(flatten))]
@@ -95,7 +91,7 @@ pub struct Depth {
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS", value_parser = parse_positive))]
     pub depth_scale: Option<f32>,
     /// Value of a depth picture that means unknown, besides 0
-    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "0"))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "0", value_parser = whole_number_parser(0..=u16::MAX)))]
     pub depth_invalid: u16,
     /// Meaning of the values in depth pictures: metres (scaled by --depth-scale), millimetres, scale:N (N units per
     /// metre), inverse (relative inverse depth, as from networks and phones: the largest values, white, are near) or
@@ -104,8 +100,7 @@ pub struct Depth {
     pub depth_unit: Option<DepthUnit>,
     /// In inverse depth, the largest values (white) are far
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true))]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub depth_invert: bool,
     /// Fit of a photo's depth map with another aspect ratio: stretch (both show the same view) or crop (the photo is the
     /// middle of the map) [default: stretch up to 2 %, and squares]
@@ -156,13 +151,11 @@ impl Depth {
 pub struct Stereo {
     /// Each picture of the source shows the left and right camera side by side, the left camera in the left half
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true))]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub side_by_side: bool,
     /// The pictures are already rectified: a point is in the same row of both
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true))]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub rectified: bool,
     /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
     /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, value_parser};
+use clap::Args;
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -12,7 +12,7 @@ use crate::options::{Global, Output};
 use crate::terminal;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::look::ApertureSetting;
-use bokehcam::look::number::in_range_parser;
+use bokehcam::look::number::{in_range_parser, whole_number_parser};
 use bokehcam::recording::still::write_color;
 
 use bokehcam_lab::aperture::{Analysis, RankErrors, draw_sheet, plot_error_by_rank};
@@ -40,11 +40,11 @@ pub struct ApertureCommand {
     )]
     apertures: Vec<ApertureSetting>,
     /// Columns and rows of the kernel, 5 to 257
-    #[arg(long, value_name = "PX", default_value = "65", value_parser = value_parser!(u16).range(5..=257))]
+    #[arg(long, value_name = "PX", default_value = "65", value_parser = whole_number_parser(5..=257_u16))]
     size: u16,
     /// Ranks to show, each 1 to 64, at most 12
     #[arg(long, value_name = "RANKS", value_delimiter = ',', default_value = "1,2,3,4,6,8",
-          value_parser = value_parser!(u16).range(1..=64))]
+          value_parser = whole_number_parser(1..=64_u16))]
     ranks: Vec<u16>,
     /// Width of the soft rim, as a fraction of the radius; 0 is the hard rim of the paper
     #[arg(id = "analysed_rim", long = "rim", value_name = "W", default_value_t = 0.0, value_parser = in_range_parser(0.0..=1.0))]

@@ -6,7 +6,7 @@ mod picture;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use clap::{Args, value_parser};
+use clap::Args;
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -22,7 +22,7 @@ use bokehcam::computing::ComputeOptions;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
-use bokehcam::look::number::in_range_parser;
+use bokehcam::look::number::{in_range_parser, parse_count, whole_number_parser};
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, SourceDepth, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::source::{self, DepthChoice, Size, SourceName};
@@ -63,13 +63,13 @@ pub struct BenchCommand {
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
-          value_parser = value_parser!(u16).range(1..=1024))]
+          value_parser = whole_number_parser(1..=1024_u16))]
     threads: Vec<u16>,
     /// Content of the picture
     #[arg(long, value_parser = options::named_value_parser::<picture::Scene>(), value_name = "WHICH", default_value_t)]
     scene: picture::Scene,
     /// Frames to measure [default: 20, or fewer if they would take more than 2 s]
-    #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(id = "benched_frames", long = "frames", value_name = "N", value_parser = parse_count::<u32>)]
     frames: Option<u32>,
     /// Let frames arrive at this rate, as in a live stream, instead of one after another: threads sleep in between
     #[arg(id = "benched_fps", long = "fps", value_name = "N", value_parser = in_range_parser(1.0..=1000.0))]

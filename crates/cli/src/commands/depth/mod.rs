@@ -6,7 +6,7 @@ mod preview;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, value_parser};
+use clap::Args;
 
 use crate::error::CliError;
 use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
@@ -21,7 +21,7 @@ use bokehcam::depth::DepthError;
 use bokehcam::depth::stereo::check::{Verdict, check_pair};
 use bokehcam::depth::stereo::{Effort, MatchError, Pair, Settings};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
-use bokehcam::look::number::{in_range_parser, parse_positive};
+use bokehcam::look::number::{in_range_parser, parse_positive, whole_number_parser};
 use bokehcam::optics::StereoRig;
 use bokehcam::recording::geometry::Geometry;
 use bokehcam::recording::still::{self, MapFormat};
@@ -56,7 +56,7 @@ pub struct DepthCommand {
     /// else 64]
     // Distinct ids: the settings of the same names belong to live sources.
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
-          value_parser = value_parser!(u32).range(1..=i64::from(Settings::MAX_DISPARITIES)))]
+          value_parser = whole_number_parser(1..=Settings::MAX_DISPARITIES))]
     max_disparity: Option<u32>,
     /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
     /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list

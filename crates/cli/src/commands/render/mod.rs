@@ -11,7 +11,7 @@ mod map_folder;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, value_parser};
+use clap::Args;
 
 use input::{FoundDepth, Input, read_input};
 
@@ -36,6 +36,7 @@ use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::still::Depth;
 use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::number::whole_number_parser;
 use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
 use bokehcam::names;
 use bokehcam::recording::snapshot;
@@ -44,7 +45,7 @@ use bokehcam::source::photo;
 use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
 
 /// Largest change of a mask, in pixels.
-const MAX_MASK_PX: i64 = 200;
+const MAX_MASK_PX: u16 = 200;
 
 /// Blur one still picture, or many
 #[derive(Args, Clone, Debug)]
@@ -81,11 +82,11 @@ pub struct RenderCommand {
     /// Move the outline of --mask outwards by this much, in pixels of the picture; inwards if negative. Then it is
     /// fitted to the colours of the picture, unless --refine off is given
     #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
-          value_parser = value_parser!(i32).range(-MAX_MASK_PX..=MAX_MASK_PX))]
+          value_parser = whole_number_parser(-i32::from(MAX_MASK_PX)..=i32::from(MAX_MASK_PX)))]
     mask_grow: i32,
     /// Turn the outline of --mask into a gradual transition, of this many pixels on both sides
     #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
-          value_parser = value_parser!(u16).range(0..=MAX_MASK_PX))]
+          value_parser = whole_number_parser(0..=MAX_MASK_PX))]
     mask_feather: u16,
     /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
     /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
