@@ -8,6 +8,8 @@ use std::str::FromStr;
 use super::{DepthOrigin, Frames, Source, SourceError, containers, suggestion, video};
 use crate::capture::{demo, y4m};
 use crate::recording::{is_recording_file, pictures, still};
+#[cfg(feature = "camera")]
+use crate::v4l2::node::NodeError;
 
 /// The name of the synthetic scene.
 const SYNTHETIC: &str = "synthetic";
@@ -115,11 +117,23 @@ fn accepted_sources() -> &'static str {
     }
 }
 
-/// Creates the error for a missing folder; suggests a sibling with a similar name.
-fn missing_folder_error(text: &str) -> SourceError {
-    let hint = suggestion::find_similar_folder(Path::new(text))
-        .map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
-    SourceError::NotFound(format!("there is no such folder{hint}; use {}", accepted_sources()))
+/// Returns whether a text is meant as the name of a file: it has an extension, such as `clip.mp4`.
+fn is_file_name(text: &str) -> bool {
+    const MAX_LETTERS: usize = 5;
+    let is_extension = |text: &str| text.len() <= MAX_LETTERS && text.bytes().any(|byte| byte.is_ascii_alphabetic());
+    !text.starts_with("/dev/") && Path::new(text).extension().is_some_and(|end| end.to_str().is_some_and(is_extension))
+}
+
+/// Creates the error for a missing file or folder; suggests a sibling with a similar name.
+fn missing_path_error(text: &str) -> SourceError {
+    let path = Path::new(text);
+    let is_file = is_file_name(text);
+    let near = suggestion::find_similar(path, if is_file { Path::is_file } else { Path::is_dir });
+    let hint = near.map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
+    SourceError::NotFound(match is_file {
+        true => format!("there is no such file{hint}"),
+        false => format!("there is no such folder{hint}; use {}", accepted_sources()),
+    })
 }
 
 /// Parses the name of one camera, or of two as `LEFT,RIGHT`; errors suggest similar names.
@@ -129,8 +143,11 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
         let node = crate::v4l2::node::resolve_node(name)?;
         Ok(NamedCamera { name: name.to_owned(), node })
     };
-    let refuse = |error: crate::v4l2::node::NodeError| {
-        Err(SourceError::NotFound(match suggestion::find_similar_folder(Path::new(text)) {
+    let refuse = |error: NodeError| {
+        if is_file_name(text) && matches!(error, NodeError::NotFound { .. }) {
+            return Err(missing_path_error(text));
+        }
+        Err(SourceError::NotFound(match suggestion::find_similar(Path::new(text), Path::is_dir) {
             Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), accepted_sources()),
             None => format!("{error}; use {}", accepted_sources()),
         }))
@@ -180,6 +197,7 @@ fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
     let what = "this build leaves cameras out (feature `camera`)";
     Err(match text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
         true => SourceError::Usage(format!("{what}: use {}", accepted_sources())),
+        false if is_file_name(text) => missing_path_error(text),
         false => SourceError::NotFound(format!("there is no such folder, and {what}: use {}", accepted_sources())),
     })
 }
@@ -214,9 +232,10 @@ impl SourceName {
                 accepted_sources()
             )),
             _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
-            Some(text) if is_path(text) => Err(missing_folder_error(text)),
+            Some(text) if is_path(text) => Err(missing_path_error(text)),
+            Some("") => SourceError::usage_error(format!("the name is empty: use {}", accepted_sources())),
             Some(text) => parse_cameras(text),
-            None => Err(missing_folder_error(&path.display().to_string())),
+            None => Err(missing_path_error(&path.display().to_string())),
         }
     }
 
