@@ -5,6 +5,7 @@ pub mod data;
 pub mod folder;
 pub mod guardian;
 pub mod input;
+pub mod lock;
 pub mod pipe_reader;
 pub mod place;
 pub mod process;

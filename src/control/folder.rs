@@ -5,19 +5,16 @@ use std::io;
 use std::io::ErrorKind;
 use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use rustix::fs::{FlockOperation, flock};
-use rustix::io::Errno;
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
+use crate::files::lock::lock_folder;
 use crate::files::trusted::absolute_env_path;
 
 /// Time limit for the folder's lock, which runs hold briefly while they start.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(1);
-const POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// File extension of sockets.
 const SOCKET_EXTENSION: &str = ".sock";
 
@@ -61,17 +58,7 @@ pub(super) fn create_locked() -> Result<(PathBuf, File), ControlError> {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(refuse(error)),
         _ => {}
     }
-    let lock = File::open(&folder).map_err(refuse)?;
-    let until = Instant::now() + LOCK_TIMEOUT;
-    while let Err(error) = flock(&lock, FlockOperation::NonBlockingLockExclusive) {
-        if error != Errno::WOULDBLOCK {
-            return Err(refuse(error.into()));
-        }
-        if Instant::now() >= until {
-            return Err(ControlError::NoFolder(format!("{} is locked by another program", folder.display())));
-        }
-        thread::sleep(POLL_INTERVAL);
-    }
+    let lock = lock_folder(&folder, LOCK_TIMEOUT).map_err(refuse)?;
     // Another user may have created it just now.
     socket_folder()?;
     Ok((folder.clone(), lock))

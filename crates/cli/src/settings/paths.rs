@@ -3,6 +3,8 @@
 use std::any::TypeId;
 use std::path::{Path, PathBuf};
 
+use clap::Arg;
+
 use super::table::all_settings_command;
 use bokehcam::look::{Patch, settings};
 use bokehcam::source::DepthChoice;
@@ -37,6 +39,21 @@ pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {
     }
     // A language is a name or a file.
     if name == "language" && value.ends_with(".toml") { absolute(value) } else { value.to_owned() }
+}
+
+/// Returns the files that a setting reads, as written in its value.
+pub fn input_files(name: &str, value: &str) -> Vec<PathBuf> {
+    /// Settings for results.
+    const OUTPUTS: [&str; 2] = ["report", "save-to"];
+    let name = settings::resolve_alias(name);
+    if settings::find_setting(name).is_some() {
+        return Patch::parse([(name, value)]).unwrap_or_default().unread_files_mut().map(|file| file.clone()).collect();
+    }
+    let every = all_settings_command();
+    let is_file = |arg: &&Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+    let arg = every.get_arguments().find(|arg| arg.get_long() == Some(name) && !OUTPUTS.contains(&name));
+    let delimiter = arg.filter(is_file).map(|arg| arg.get_value_delimiter().unwrap_or('\0'));
+    delimiter.map_or(Vec::new(), |delimiter| value.split(delimiter).map(PathBuf::from).collect())
 }
 
 /// Returns the file in a value if its path is absolute: `image:/a/b.png` contains `/a/b.png`.
@@ -74,6 +91,15 @@ mod tests {
             ("nothing", "x", "x".into()),
         ] {
             assert_eq!(resolve_paths(home.path(), name, value), absolute, "{name}={value}");
+        }
+        for (name, value, files) in [
+            ("behind", "image:/wall,1.jpg", &["/wall,1.jpg"][..]),
+            ("aperture", "heart", &[]),
+            ("calib", "/l.yaml,/r.yaml", &["/l.yaml", "/r.yaml"]),
+            ("report", "/r.json", &[]),
+            ("depth", "matte", &[]),
+        ] {
+            assert_eq!(input_files(name, value), files.iter().map(PathBuf::from).collect::<Vec<_>>(), "{name}={value}");
         }
         assert_eq!(absolute_file_in("image:/a:b.png"), Some("/a:b.png"));
         assert_eq!(absolute_file_in("/a/b"), Some("/a/b"));

@@ -5,19 +5,25 @@ use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use toml_edit::{DocumentMut, Item, TableLike, Value};
 
 use super::dump::toml_number;
 use super::file::{self, SettingsFile};
 use super::layers::Setting;
-use super::paths::resolve_paths;
+use super::paths::{self, resolve_paths};
 use super::table::find_excluded;
 use crate::error::CliError;
-use crate::files::write_atomically;
+use crate::files::{create_parent_folder, write_atomically};
+use crate::log;
 use crate::terminal;
-use bokehcam::files::input;
+use bokehcam::files::lock::lock_folder;
+use bokehcam::files::{atomic_file, input};
 use bokehcam::look::settings;
+
+/// Time limit for the lock of the file's folder, which programs hold while they save.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Runs `config save`: writes the settings given as flags to the chosen file or the user's.
 ///
@@ -33,6 +39,11 @@ pub fn save_settings(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), 
     if names.is_empty() {
         let what = "nothing to save: give settings as flags, such as --rim 0.1";
         return Err(CliError::Usage(what.to_string()));
+    }
+    for (name, value) in &given {
+        for file in paths::input_files(name, value).iter().filter(|file| !file.exists()) {
+            log::warn(&format!("{name}: {}: there is no such file; commands need it", file.display()));
+        }
     }
     let path = file_to_save(chosen)?;
     let excluded = find_excluded(&names);
@@ -59,29 +70,38 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
     chosen.map(Path::to_owned).or_else(file::user_file).ok_or_else(no_home)
 }
 
-/// Edits the settings file at `path` atomically; creates it and its folder if missing.
+/// Edits the settings file at `path` atomically, one program after another; creates it and its folder if missing. A value
+/// that is refused may be there before the change.
 ///
 /// # Errors
-/// Fails if the file is not a settings file before or after the change, cannot be read or written, or `change` returns
-/// `None`.
+/// Fails if the file is not TOML before or no settings file after the change, cannot be read or written, or `change`
+/// returns `None`.
 pub fn edit_file(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
     // A symbolic link, for example into a repository of settings, is followed and not replaced.
     let path = &link_target(path)?;
+    create_parent_folder(path)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Held until the file is replaced: of two programs that read it at once, the first one's change would be lost.
+    let _lock = lock_folder(folder, LOCK_TIMEOUT).map_err(CliError::io(folder))?;
+    for part in atomic_file::find_abandoned(path).map_err(CliError::io(folder))? {
+        // Of a killed save, which changed nothing. One that cannot be removed does no harm.
+        let _ = fs::remove_file(part);
+    }
     let text = match input::read_text(path, input::MAX_SETTINGS_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         read => read.map_err(CliError::io(path))?,
     };
-    SettingsFile::parse(path, &text)?;
     let no_place =
         || CliError::Settings { path: path.clone(), line: 1, what: "nothing can be added to it".to_string() };
-    let mut document: DocumentMut = text.parse().map_err(|_| no_place())?;
-    change(&mut document).ok_or_else(no_place)?;
-    let edited = document.to_string();
-    // Unreadable results are not written.
-    SettingsFile::parse(path, &edited)?;
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(CliError::io(folder))?;
-    }
+    let edit = || {
+        let mut document: DocumentMut = text.parse().map_err(|_| no_place())?;
+        change(&mut document).ok_or_else(no_place)?;
+        let edited = document.to_string();
+        // Unreadable results are not written.
+        SettingsFile::parse(path, &edited).map(|_| edited)
+    };
+    // A fault that was there before is named with its line in the file as it is.
+    let edited = edit().map_err(|refused| SettingsFile::parse(path, &text).err().unwrap_or(refused))?;
     write_atomically(path, edited.as_bytes(), true)
 }
 

@@ -3,8 +3,10 @@
 use std::fs::{self, File};
 use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
 
-use crate::program::{Home, ROOT, Ran};
+use crate::program::{Beside, Home, ROOT, Ran};
 
 use super::pictures::text;
 
@@ -77,6 +79,63 @@ fn what_cannot_be_saved_changes_nothing() {
     let home = Home::new().with_settings("rim = \n");
     home.run(&["config", "save", "--rim", "0.1"]).refused(2, &["config.toml:1: "]);
     assert_eq!(text(&home.settings()), "rim = \n");
+}
+
+#[test]
+fn a_value_that_is_refused_is_replaced() {
+    let home = Home::new().with_settings("# mine\nblur = -3\nrim = 0.4\n");
+    home.run(&["config", "dump"]).refused(2, &["config.toml:2: "]);
+    Ran::of(home.command(&["config", "save", "--blur", "3%"]).env("BOKEHCAM_BLUR", "abc")).done();
+    assert_eq!(text(&home.settings()), "# mine\nblur = \"3%\"\nrim = 0.4\n");
+    // Another fault stays, and is named with its line in the file as it is.
+    let typo = "rim = 0.4\n[presets.a]\nhighlihts = 8\n";
+    let home = Home::new().with_settings(typo);
+    home.run(&["config", "save", "--blur", "3%"]).refused(2, &["config.toml:3: there is no setting 'highlihts'"]);
+    assert_eq!(text(&home.settings()), typo);
+}
+
+#[test]
+fn settings_that_are_saved_at_once_are_all_there() {
+    const SETTINGS: [(&str, &str); 4] = [("rim", "0.1"), ("blur", "3"), ("focus", "1.5"), ("aperture", "star:5")];
+    for _ in 0..5 {
+        let home = Home::new();
+        let start = |(name, value): (&str, &str)| {
+            Beside::start(home.command(&["config", "save", &format!("--{name}"), value]).stderr(Stdio::piped()))
+        };
+        for saving in SETTINGS.map(start) {
+            assert!(saving.end(Duration::from_secs(60)).done().contains(": saved "));
+        }
+        let saved = text(&home.settings());
+        assert_eq!(saved.lines().count(), SETTINGS.len(), "{saved}");
+    }
+}
+
+#[test]
+fn what_a_killed_save_left_behind_is_removed_and_nothing_else() {
+    let home = Home::new().with_settings("rim = 0.4\n");
+    let beside = |name: &str| home.settings().with_file_name(name);
+    let (dead, of_another, held) =
+        (beside(".config.toml.4711-0.part"), beside(".other.toml.4711-0.part"), beside(".config.toml.4712-0.part"));
+    for part in [&dead, &of_another, &held] {
+        fs::write(part, "rim = 0.").unwrap();
+    }
+    let writer = File::open(&held).unwrap();
+    rustix::fs::flock(&writer, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    home.run(&["config", "save", "--rim", "0.2"]).done();
+    assert_eq!([&dead, &of_another, &held].map(|part| part.exists()), [false, true, true]);
+    assert_eq!(text(&home.settings()), "rim = 0.2\n");
+}
+
+#[test]
+fn a_picture_that_is_not_there_is_told_when_it_is_saved() {
+    let home = Home::new().with_photo();
+    for (option, value) in
+        [("--behind", "image:nofile.jpg"), ("--aperture", "image:nofile.png"), ("--calib", "no.yaml")]
+    {
+        let saved = home.run(&["config", "save", option, value]);
+        assert!(saved.warning().contains("there is no such file"), "{}", saved.stderr);
+    }
+    assert_eq!(home.run(&["config", "save", "--behind", "image:photo.png", "--report", "r.json"]).warning(), "");
 }
 
 #[test]
