@@ -27,7 +27,7 @@ pub enum PipeWireError {
     Ambiguous { name: String, found: Vec<String> },
     /// The session manager does not support filters.
     #[error(
-        "this session manager does not support filters for cameras: use WirePlumber 0.5 or later (Debian 13, Fedora    \
+        "this session manager does not support filters for cameras: use WirePlumber 0.5 or later (Debian 13, Fedora \
          40); or use --to pipewire, a separate camera, which any session manager supports"
     )]
     NoFilters,

@@ -14,6 +14,11 @@ const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS
 
 /// Warns of variables with the prefix `BOKEHCAM_` that match no setting.
 pub fn warn_of_unknown() {
+    describe_unknown().iter().for_each(|what| log::warn(what));
+}
+
+/// Describes the variables with the prefix `BOKEHCAM_` that match no setting; `None` if there are none.
+pub fn describe_unknown() -> Option<String> {
     let settings = all_settings_command();
     let names = settings.get_arguments().flat_map(|arg| {
         arg.get_long()
@@ -28,14 +33,12 @@ pub fn warn_of_unknown() {
         let rest = name.strip_prefix(PREFIX);
         rest.is_some_and(|rest| !NOT_SETTINGS.contains(&rest)) && !known.contains(name)
     };
-    let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| describe_unknown(&name)).collect();
+    let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| suggest_variable(&name)).collect();
     unknown.sort();
-    if !unknown.is_empty() {
-        log::warn(&format!("in the environment there is {}", unknown.join(" and ")));
-    }
+    (!unknown.is_empty()).then(|| format!("in the environment there is {}", unknown.join(" and ")))
 }
 
-fn describe_unknown(name: &str) -> String {
+fn suggest_variable(name: &str) -> String {
     let setting = name.strip_prefix(PREFIX).unwrap_or(name).replace('_', "-").to_lowercase();
     let hint = suggest_setting(&setting)
         .map_or(String::new(), |near| format!(", did you mean {}?", environment_variable(&near)));

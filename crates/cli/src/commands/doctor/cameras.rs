@@ -32,13 +32,18 @@ pub fn check_cameras(nodes: &[Node], system: &System) -> Vec<Finding> {
         findings.push(Finding::note(TOPIC, found, "connect a USB camera"));
     }
     if cameras.is_empty() {
-        let fix = match &system.sandbox {
-            Some(sandbox) => format!("let this {sandbox} have the camera's node, such as /dev/video0"),
-            None => "connect a camera; if it is connected, see `lsusb` and `sudo dmesg`".to_owned(),
-        };
-        findings.push(Finding::missing(TOPIC, "there is none", fix));
+        findings.push(report_none(system));
     }
     findings
+}
+
+/// Reports that there is no camera.
+pub fn report_none(system: &System) -> Finding {
+    let fix = match &system.sandbox {
+        Some(sandbox) => format!("let this {sandbox} have the camera's node, such as /dev/video0"),
+        None => "connect a camera; if it is connected, see `lsusb` and `sudo dmesg`".to_owned(),
+    };
+    Finding::missing(TOPIC, "there is none", fix)
 }
 
 /// Reports a node that this user may not open.

@@ -1,14 +1,15 @@
 //! Runs all checks, and prints their findings.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::finding::{Finding, Level};
 #[cfg(feature = "pipewire")]
-use super::pipewire_camera;
+use super::pipewire_camera::{self, PipeWireResults};
 use super::system::System;
-use super::{CliError, cameras, computing, loopback};
+use super::{CliError, cameras, computing, loopback, settings};
 use crate::terminal::print_to_stdout;
 use bokehcam::v4l2::node::{Node, list_nodes};
 
@@ -28,8 +29,8 @@ pub struct CheckResults {
 }
 
 impl CheckResults {
-    /// Runs all checks.
-    pub fn collect() -> Self {
+    /// Runs all checks. `config` is the chosen settings file.
+    pub fn collect(config: Option<&Path>) -> Self {
         let system = System::detect();
         let nodes = list_nodes();
         let mut findings = cameras::check_cameras(&nodes, &system);
@@ -37,13 +38,7 @@ impl CheckResults {
         #[cfg(feature = "pipewire")]
         {
             let verdict = pipewire_camera::check_pipewire(&system);
-            // One kind of camera source is enough, and one kind of virtual camera.
-            for finding in findings.iter_mut().filter(|finding| finding.level == Level::Missing) {
-                let is_camera = finding.about == cameras::TOPIC;
-                let is_optional = if is_camera { verdict.has_cameras } else { verdict.can_publish };
-                finding.level = if is_optional { Level::Note } else { Level::Missing };
-            }
-            findings.extend(verdict.findings);
+            findings = add_pipewire(findings, verdict, &system);
         }
         #[cfg(not(feature = "pipewire"))]
         findings.push(Finding::note(
@@ -52,6 +47,7 @@ impl CheckResults {
             "build it with the feature pipewire",
         ));
         findings.extend(computing::check_computing());
+        findings.extend(settings::check_settings(config));
         Self { system, nodes, findings }
     }
 
@@ -67,12 +63,29 @@ impl CheckResults {
     }
 }
 
+/// Adds the results of PipeWire to findings about devices: one kind of camera is enough, and one kind of virtual camera.
+#[cfg(feature = "pipewire")]
+fn add_pipewire(mut findings: Vec<Finding>, verdict: PipeWireResults, system: &System) -> Vec<Finding> {
+    let PipeWireResults { findings: others, can_publish, cameras } = verdict;
+    let has_cameras = !cameras.is_empty();
+    let none = cameras::report_none(system);
+    if let Some(finding) = findings.iter_mut().find(|finding| has_cameras && **finding == none) {
+        *finding = Finding::good(cameras::TOPIC, format!("by PipeWire: {}", cameras.join(", ")));
+    }
+    for finding in findings.iter_mut().filter(|finding| finding.level == Level::Missing) {
+        let is_optional = if finding.about == cameras::TOPIC { has_cameras } else { can_publish };
+        finding.level = if is_optional { Level::Note } else { Level::Missing };
+    }
+    findings.extend(others);
+    findings
+}
+
 /// Runs all checks and prints the findings.
 ///
 /// # Errors
 /// [`CliError::NotReady`] if something essential is missing.
-pub fn run(json: bool) -> Result<(), CliError> {
-    let examined = CheckResults::collect();
+pub fn run(json: bool, config: Option<&Path>) -> Result<(), CliError> {
+    let examined = CheckResults::collect(config);
     let missing = examined.missing_topics();
     if json {
         let report = Report { ready: missing.is_empty(), system: &examined.system, findings: &examined.findings };
@@ -104,4 +117,23 @@ fn format_findings(findings: &[Finding]) -> String {
         }
     }
     out
+}
+
+#[cfg(all(test, feature = "pipewire"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_of_pipewire_is_a_camera() {
+        let system = System::detect();
+        let devices = || cameras::check_cameras(&[], &system);
+        let topics = |cameras: &[&str]| {
+            let cameras = cameras.iter().map(ToString::to_string).collect();
+            let verdict = PipeWireResults { findings: Vec::new(), can_publish: true, cameras };
+            let findings = add_pipewire(devices(), verdict, &system);
+            findings.into_iter().map(|finding| (finding.level, finding.found)).collect::<Vec<_>>()
+        };
+        assert_eq!(topics(&["Integrated Webcam"]), [(Level::Good, "by PipeWire: Integrated Webcam".to_owned())]);
+        assert_eq!(topics(&[]), [(Level::Missing, "there is none".to_owned())]);
+    }
 }

@@ -19,6 +19,8 @@ mod private;
 #[cfg(feature = "camera")]
 mod report;
 #[cfg(feature = "camera")]
+mod settings;
+#[cfg(feature = "camera")]
 mod system;
 
 use std::path::PathBuf;
@@ -26,8 +28,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::error::CliError;
+use crate::options::Global;
 
-/// Check this machine: cameras, virtual camera, permissions, GPU, programs
+/// Check this machine: cameras, virtual camera, permissions, GPU, programs, your settings
 ///
 /// Every finding comes with advice. Add the output to a request for help. The exit code is 0 when there are a camera
 /// and a way to provide a virtual one (the module v4l2loopback, or PipeWire), else 1; with --report it is 0 if the
@@ -53,15 +56,16 @@ pub struct DoctorCommand {
 ///
 /// # Errors
 /// Fails if something essential is missing, or this program was built without cameras.
-pub fn run(command: &DoctorCommand) -> Result<(), CliError> {
+pub fn run(command: &DoctorCommand, global: &Global) -> Result<(), CliError> {
+    let config = global.config.as_deref();
     #[cfg(feature = "camera")]
     match &command.report {
-        Some(file) => report::run(file.as_deref()),
-        None => findings::run(command.json),
+        Some(file) => report::run(file.as_deref(), config),
+        None => findings::run(command.json, config),
     }
     #[cfg(not(feature = "camera"))]
     {
-        let _ = command;
+        let _ = (command, config);
         Err(CliError::NoCameras)
     }
 }

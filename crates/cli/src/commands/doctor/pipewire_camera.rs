@@ -27,8 +27,8 @@ pub struct PipeWireResults {
     pub findings: Vec<Finding>,
     /// Whether this program can publish a camera that others can read.
     pub can_publish: bool,
-    /// Whether there is a camera to read from.
-    pub has_cameras: bool,
+    /// The cameras to read from, by the names that people see.
+    pub cameras: Vec<String>,
 }
 
 /// Checks the requirements of a PipeWire camera, from the daemon to the browsers.
@@ -37,11 +37,10 @@ pub fn check_pipewire(system: &System) -> PipeWireResults {
         Ok(graph) => graph,
         Err(error) => {
             let findings = vec![report_unreachable(&error)];
-            return PipeWireResults { findings, can_publish: false, has_cameras: false };
+            return PipeWireResults { findings, can_publish: false, cameras: Vec::new() };
         }
     };
     let all: Vec<_> = graph.sources.iter().filter(|source| source.is_camera).collect();
-    let has_cameras = all.iter().any(|camera| !camera.process.is_some_and(is_bokehcam));
     let cameras: Vec<&str> = all.iter().map(|camera| camera.label.as_str()).collect();
     let there_are = if cameras.is_empty() { "no camera yet".to_owned() } else { cameras.join(", ") };
     let mut findings = vec![Finding::good(TOPIC, format!("it is running, with {there_are}; --to pipewire adds one"))];
@@ -77,7 +76,12 @@ pub fn check_pipewire(system: &System) -> PipeWireResults {
             )
         },
     ));
-    PipeWireResults { findings, can_publish: has_manager, has_cameras: has_manager && has_cameras }
+    let readable = all.iter().filter(|camera| has_manager && !camera.process.is_some_and(is_bokehcam));
+    PipeWireResults {
+        can_publish: has_manager,
+        cameras: readable.map(|camera| camera.label.clone()).collect(),
+        findings,
+    }
 }
 
 /// Whether a process is an instance of this program: its output does not count as a camera.
@@ -88,7 +92,11 @@ fn is_bokehcam(process: u32) -> bool {
 fn report_unreachable(error: &PipeWireError) -> Finding {
     let fix = "it is only needed for --to pipewire: `sudo apt install pipewire wireplumber`, then `systemctl --user \
                start pipewire wireplumber`";
-    Finding::note(TOPIC, error.to_string(), fix)
+    let found = match error {
+        PipeWireError::NoDaemon { socket } => format!("it does not run: nothing answers at {socket}"),
+        error => error.to_string(),
+    };
+    Finding::note(TOPIC, found, fix)
 }
 
 /// Whether the portal reports a camera; `None` if it does not answer.

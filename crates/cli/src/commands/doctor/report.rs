@@ -7,7 +7,7 @@ use super::findings::CheckResults;
 use super::private::Redactor;
 use super::{CliError, hardware};
 use crate::commands::{bench, devices};
-use crate::files::{refuse_overwrite, write_atomically};
+use crate::files::{create_parent_folder, refuse_overwrite, write_atomically};
 use crate::terminal::{print_to_stderr, print_to_stdout};
 
 /// Introduction, and a question for the user to answer.
@@ -21,13 +21,13 @@ out; no picture was taken, nothing was sent. Read it all before you give it to o
 
 ";
 
-/// Prints a report of this machine and writes it to `file`, if given.
+/// Prints a report of this machine and writes it to `file`, if given. `config` is the chosen settings file.
 ///
 /// # Errors
 /// Fails if the file exists or cannot be written.
-pub fn run(file: Option<&Path>) -> Result<(), CliError> {
+pub fn run(file: Option<&Path>, config: Option<&Path>) -> Result<(), CliError> {
     refuse_overwrite(file, false).map_err(remove_force_hint)?;
-    let examined = CheckResults::collect();
+    let examined = CheckResults::collect(config);
     let mut facts = String::new();
     add_section(
         &mut facts,
@@ -41,6 +41,7 @@ pub fn run(file: Option<&Path>) -> Result<(), CliError> {
     print_to_stdout(report.as_bytes())?;
     match file {
         Some(file) => {
+            create_parent_folder(file)?;
             write_atomically(file, report.as_bytes(), false).map_err(remove_force_hint)?;
             print_to_stderr(&format!("this report is in {}, and was not sent anywhere", file.display()));
         }
