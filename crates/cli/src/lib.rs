@@ -70,7 +70,9 @@ fn run_command(args: &[OsString]) -> ExitCode {
     log::start(&cli.global);
     #[cfg(feature = "networks")]
     bokehcam::network::isolation::enable();
-    environment::warn_of_unknown();
+    if commands::reads_settings(&matches) {
+        environment::warn_of_unknown();
+    }
     match commands::run(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of our output closed it: no failure.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
-use super::commands::Cli;
+use super::commands::{Cli, reads_settings};
 use super::error::CliError;
 use super::help;
 use super::settings::file::SettingsFile;
@@ -34,11 +34,17 @@ pub struct Parsed {
 
 /// Parses arguments together with the environment, preset, snapshot and settings file that apply.
 pub fn parse(args: &[OsString]) -> Result<Parsed, ParseError> {
-    let command = help::full_help(table::with_environment(Cli::command()));
+    let command = table::with_environment(Cli::command())
+        .mut_arg("config", |arg| table::with_variable(arg, table::environment_variable("config")));
+    let command = help::full_help(command);
     let wants_all = args.iter().take_while(|arg| *arg != "--").any(|arg| arg == help::ALL);
     let command = if wants_all { command } else { help::short_help(command) };
     // The first pass finds the settings file and the preset; the second one uses their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
+    if !reads_settings(&given) {
+        let cli = Cli::from_arg_matches(&given)?;
+        return Ok(Parsed { cli, matches: given, file: SettingsFile::default(), layers: Layers::default() });
+    }
     let chosen = Cli::from_arg_matches(&given)?.global.config;
     let file = load_settings(&given, chosen.as_deref()).map_err(ParseError::Settings)?;
     let layers = Layers::resolve(&file, &given).map_err(ParseError::Settings)?;
@@ -46,14 +52,10 @@ pub fn parse(args: &[OsString]) -> Result<Parsed, ParseError> {
     Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
 }
 
-/// Loads the settings file, with the exceptions of `config save` and `config dump`.
+/// Loads the settings file, unless `config dump` is printed into it.
 fn load_settings(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
-    let config = given.subcommand_matches("config").and_then(ArgMatches::subcommand_name);
-    match (config, chosen) {
-        // `config save` creates the chosen file.
-        (Some("save"), Some(path)) if path.symlink_metadata().is_err() => return Ok(SettingsFile::default()),
-        (Some("dump"), _) => save::refuse_redirect(chosen)?,
-        _ => {}
+    if given.subcommand_matches("config").is_some() {
+        save::refuse_redirect(chosen)?;
     }
     SettingsFile::load(chosen)
 }

@@ -1,13 +1,13 @@
 //! `completions`: shell completions, generated from the clap command.
 
 use std::any::TypeId;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, Command, ValueHint};
 
+use crate::log;
 use crate::settings::file::SettingsFile;
-use bokehcam::look::presets;
 use bokehcam::sink::Target;
 use bokehcam::source::SourceName;
 
@@ -20,13 +20,7 @@ const VALUES: [(&str, &[&str]); 4] = [
 ];
 
 /// Adds suggested values to the command's options; options that take no file get no file completion.
-pub fn add_completions(command: Command, file: &SettingsFile) -> Command {
-    let names: Vec<String> =
-        presets::built_in_presets().map(|preset| preset.name).chain(file.presets.keys().cloned()).collect();
-    add_to_tree(command, &names)
-}
-
-fn add_to_tree(command: Command, presets: &[String]) -> Command {
+pub fn add_completions(command: Command, presets: &[String]) -> Command {
     let command = command.mut_args(|arg| {
         let option = arg.get_long().unwrap_or(arg.get_id().as_str()).to_owned();
         let values = VALUES.iter().find(|(name, _)| *name == option).map(|(_, values)| *values);
@@ -39,7 +33,16 @@ fn add_to_tree(command: Command, presets: &[String]) -> Command {
             None => arg.value_hint(ValueHint::Other),
         }
     });
-    command.mut_subcommands(|subcommand| add_to_tree(subcommand, presets))
+    command.mut_subcommands(|subcommand| add_completions(subcommand, presets))
+}
+
+/// Returns the names of all presets. Those of a settings file with a fault are left out, with a warning.
+pub fn preset_names(chosen: Option<&Path>) -> Vec<String> {
+    let file = SettingsFile::load(chosen).unwrap_or_else(|fault| {
+        log::warn(&format!("{fault}; the presets of this file are left out"));
+        SettingsFile::default()
+    });
+    file.preset_names()
 }
 
 /// Whether the option takes a file or folder, or already has suggestions.

@@ -39,9 +39,9 @@ Examples:
   bokehcam stream demo --frames 90 --to out/
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
 
-Settings come from flags, then the environment (BOKEHCAM_RIM for --rim), then the preset, then the settings file,
-then defaults.
-`bokehcam config dump` shows them all. Exit code: 0 done, 1 failed, 2 wrong arguments.")]
+Settings come from flags, then the environment (BOKEHCAM_RIM for --rim), then the preset, then the
+settings file, then defaults. `bokehcam config dump` shows them all.
+Exit code: 0 done, 1 failed, 2 wrong arguments.")]
 pub struct Cli {
     #[command(flatten)]
     pub global: options::Global,
@@ -109,6 +109,16 @@ Examples:
     },
 }
 
+/// Commands that need no settings: they read neither the settings file nor the variables of settings, so that a fault in
+/// these does not stop them. `save` is that of `config`, which replaces a faulty value.
+pub const WITHOUT_SETTINGS: [&str; 8] =
+    ["completions", "ctl", "devices", "doctor", "manual", "models", "save", "service"];
+
+/// Whether the command of these matches reads settings.
+pub fn reads_settings(matches: &ArgMatches) -> bool {
+    matches.subcommand().is_none_or(|(name, inner)| !WITHOUT_SETTINGS.contains(&name) && reads_settings(inner))
+}
+
 /// Runs a command.
 ///
 /// # Errors
@@ -128,12 +138,13 @@ pub fn run(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers)
         Command::Aperture(command) => aperture::run(&command, &cli.global),
         Command::Bench(command) => bench::run(&command, &cli.global, &layers.given_settings(matches)),
         Command::Devices(command) => devices::run(&command, &cli.global),
-        Command::Doctor(command) => doctor::run(&command),
+        Command::Doctor(command) => doctor::run(&command, &cli.global),
         #[cfg(feature = "networks")]
         Command::Models(command) => models::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            let mut table = completions::add_completions(help::full_help(Cli::command()), file);
+            let presets = completions::preset_names(cli.global.config.as_deref());
+            let mut table = completions::add_completions(help::full_help(Cli::command()), &presets);
             clap_complete::generate(shell, &mut table, "bokehcam", &mut script);
             print_to_stdout(&script)
         }

@@ -8,7 +8,7 @@ mod window;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{BoolishValueParser, OsStringValueParser, RangedI64ValueParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 
 pub use bokehcam::source::options::{Depth, Frames, Networks, Orientation, Stereo};
 pub use groups::{Every, Streaming};
@@ -18,7 +18,7 @@ use crate::help::DEPTH;
 use bokehcam::compute::Backend;
 use bokehcam::computing;
 use bokehcam::look::Effect;
-use bokehcam::look::number::parse_positive;
+use bokehcam::look::number::{parse_positive, parse_switch, whole_number_parser};
 use bokehcam::names;
 use bokehcam::pipeline::Pace;
 use bokehcam::source::{DepthChoice, Size, SourceName};
@@ -52,7 +52,7 @@ pub struct Global {
     #[arg(long, global = true, action = clap::ArgAction::HelpLong)]
     help_all: Option<bool>,
     /// Settings file instead of $XDG_CONFIG_HOME/bokehcam/config.toml
-    #[arg(long, global = true, value_name = "FILE", env = "BOKEHCAM_CONFIG", hide_env = true)]
+    #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
 }
 
@@ -121,18 +121,15 @@ pub struct Stream {
     pub out_size: Option<Size>,
     /// Close the source camera while no program reads the virtual camera
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub on_demand: bool,
     /// Mirror the picture
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub mirror: bool,
     /// Skip and count frames with errors, instead of ending
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub keep_going: bool,
     /// Write a report to this JSON file: the outcome and time of every frame; - is standard output
     #[arg(long, value_name = "FILE.json")]
@@ -145,8 +142,7 @@ pub struct Stream {
 pub struct Output {
     /// Overwrite existing outputs, once the new ones are complete; in a folder, only files written by bokehcam
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
-          hide_possible_values = true)]
+          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub force: bool,
 }
 
@@ -157,5 +153,5 @@ pub fn source_name_parser() -> impl TypedValueParser<Value = SourceName> {
 
 /// Returns a parser of thread counts.
 pub fn thread_count_parser() -> impl TypedValueParser<Value = usize> {
-    RangedI64ValueParser::<u64>::new().range(1..=1024).map(|threads| threads as usize)
+    whole_number_parser(1..=1024_usize)
 }

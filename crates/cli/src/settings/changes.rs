@@ -10,7 +10,7 @@ use super::table;
 use crate::error::CliError;
 use crate::log;
 use crate::options::LookSettings;
-use bokehcam::look::{Patch, settings};
+use bokehcam::look::{Patch, presets, settings};
 
 /// Parses settings, each written `NAME=VALUE`, as a patch of a look.
 ///
@@ -54,12 +54,13 @@ fn unknown_setting(name: &str, value: &str) -> String {
     format!("there is no setting '{name}' of the look{hint}")
 }
 
-/// Returns the patch of a preset, built in or from the current settings file.
+/// Returns the patch of a preset, built in or from the current settings file, which is read only for one of its own.
 ///
 /// # Errors
 /// Fails if the preset does not exist, or the settings file or an aperture's picture cannot be read.
 pub fn load_preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
-    let file = SettingsFile::load(chosen)?;
+    let is_built_in = presets::built_in_presets().any(|preset| preset.name == name);
+    let file = if is_built_in { SettingsFile::default() } else { SettingsFile::load(chosen)? };
     let values = file.preset(name).ok_or_else(|| CliError::Usage(file.unknown_preset(name)))?;
     load_patch(Patch::parse(values.iter().map(|(name, value)| (name.as_str(), value.as_str()))))
 }

@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Arg, ArgMatches, Args, Command};
 
+use crate::commands::WITHOUT_SETTINGS;
 use crate::options::Every;
 use bokehcam::look::settings;
 
@@ -29,16 +30,24 @@ pub fn environment_variable(setting: &str) -> String {
 
 /// Returns the variable that sets a setting: that of its alias if only that one is set.
 pub fn active_variable(setting: &str) -> String {
-    let is_set = |variable: &String| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
     let by_name = environment_variable(setting);
-    let other =
-        settings::find_setting(setting).and_then(settings::Setting::alias).map(environment_variable).filter(is_set);
-    if is_set(&by_name) { by_name } else { other.unwrap_or(by_name) }
+    let other = settings::find_setting(setting).and_then(settings::Setting::alias).map(environment_variable);
+    if is_set(&by_name) { by_name } else { other.filter(|other| is_set(other)).unwrap_or(by_name) }
+}
+
+/// Whether a variable is set; an empty one counts as unset.
+fn is_set(variable: &str) -> bool {
+    std::env::var_os(variable).is_some_and(|value| !value.is_empty())
 }
 
 /// Assigns every setting its environment variable.
 pub fn with_environment(command: Command) -> Command {
-    map_settings(command, &|arg, name| arg.env(active_variable(name)).hide_env(true))
+    map_settings(command, &|arg, name| with_variable(arg, active_variable(name)))
+}
+
+/// Assigns an option a variable, if that is set.
+pub fn with_variable(arg: Arg, variable: String) -> Arg {
+    if is_set(&variable) { arg.env(variable).hide_env(true) } else { arg }
 }
 
 /// Returns a command with every setting and nothing else.
@@ -86,7 +95,7 @@ pub fn find_excluded(names: &[String]) -> Vec<String> {
     excluded.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
 }
 
-/// Rewrites each setting of a command and its subcommands.
+/// Rewrites each setting of a command and its subcommands, except those that read no settings.
 pub fn map_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
     let settings = all_settings_command();
     // By id: a command may have an option of the same name that is not a setting.
@@ -97,5 +106,8 @@ pub fn map_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Com
 }
 
 fn rewrite_args(command: Command, rewrite: &dyn Fn(Arg) -> Arg) -> Command {
-    command.mut_args(rewrite).mut_subcommands(|subcommand| rewrite_args(subcommand, rewrite))
+    command.mut_args(rewrite).mut_subcommands(|subcommand| match WITHOUT_SETTINGS.contains(&subcommand.get_name()) {
+        true => subcommand,
+        false => rewrite_args(subcommand, rewrite),
+    })
 }

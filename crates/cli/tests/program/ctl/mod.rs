@@ -3,6 +3,7 @@
 
 #[cfg(feature = "desktop")]
 mod bus;
+pub mod faults;
 mod outputs;
 mod refusals;
 mod runs;

@@ -14,6 +14,10 @@ fn what_is_wrong_in_the_environment_is_said_to_be_there() {
     with(&both, &["config", "dump"]).refused(2, &["BOKEHCAM_COC_AT_INFINITY=3", "BOKEHCAM_F_NUMBER=2"]);
     let late = with(&[("BOKEHCAM_DEPTH", "stereo")], &["stream", "synthetic", "--frames", "1", "--to", "null"]);
     late.refused(2, &["one camera", "BOKEHCAM_DEPTH=stereo"]);
+    // An empty variable counts as unset.
+    assert!(
+        with(&[("BOKEHCAM_RIM", ""), ("BOKEHCAM_CONFIG", "")], &["config", "dump"]).printed().contains("# default")
+    );
     // A flag overrides the environment, so its error does not mention it.
     let flag = with(&[("BOKEHCAM_RIM", "0.1")], &["config", "dump", "--rim", "7"]);
     assert!(flag.code == 2 && !flag.stderr.contains("environment"), "{}", flag.stderr);

@@ -4,6 +4,7 @@
 mod calib;
 mod depth_map;
 mod environment;
+mod faults;
 mod help;
 mod messages;
 mod names;
