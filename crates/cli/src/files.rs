@@ -47,10 +47,11 @@ pub fn refuse_overwriting_source(what: &str, target: &Path, source: &Path) -> Re
         return Ok(());
     }
     let [to, from] = [target, source].map(place::resolve_links);
-    let how = match (to == from, to.starts_with(&from)) {
-        (true, _) => "this is",
-        (_, true) => "this lies in",
-        _ => "this contains",
+    let how = match () {
+        () if to == from => "this is",
+        () if to.starts_with(&from) => "this lies in",
+        () if from.starts_with(&to) => "this contains",
+        () => "this is another name of",
     };
     let (target, source) = (target.display(), source.display());
     Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is the input; choose another place")))

@@ -55,7 +55,11 @@ impl SettingsFile {
             what: escape_controls(&what, &[]).into_owned(),
         };
         let keys = DeTable::parse(text).map_err(|error| {
-            refuse((error.span().map_or(0, |span| span.start), error.message().replace('\n', ", ")))
+            let what = format!(
+                "write NAME = VALUE, and text in double quotes (TOML: {})",
+                error.message().replace('\n', ", ")
+            );
+            refuse((error.span().map_or(0, |span| span.start), what))
         })?;
         let mut file = Self { path: Some(path.to_owned()), ..Self::default() };
         let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());

@@ -9,8 +9,8 @@ use clap::{Arg, Command, CommandFactory};
 use crate::commands::Cli;
 
 /// Plausible wrong names of options, and the right ones.
-const SYNONYMS: [(&str, &str); 4] =
-    [("background", "behind"), ("output", "out"), ("input-size", "size"), ("strength", "blur")];
+const SYNONYMS: [(&str, &str); 5] =
+    [("background", "behind"), ("output", "out"), ("o", "out"), ("input-size", "size"), ("strength", "blur")];
 
 /// Maximum number of commands that a message lists.
 const MAX_COMMANDS: usize = 4;
@@ -43,19 +43,19 @@ fn unknown_option(error: &clap::Error, invalid: &str, args: &[OsString]) -> Opti
     }
     // The command path, such as `config dump`, selects the hint.
     let here = path.join(" ");
-    let Some(name) = invalid.strip_prefix("--") else {
-        if here == "render" && !invalid.starts_with('-') {
-            return Some(format!("{invalid}: `render` blurs one picture; its depth is given by --depth-map FILE"));
-        }
-        let file = args.iter().find(|arg| arg.as_bytes().starts_with(invalid.as_bytes()) && arg.len() > 2)?;
-        let file = file.to_string_lossy();
-        return invalid
-            .starts_with('-')
-            .then(|| format!("there is no option {invalid} ({file}); a file whose name begins with - is ./{file}"));
-    };
-    if here == "ctl set" {
+    let is_long = invalid.starts_with("--");
+    if !is_long && !invalid.starts_with('-') {
+        let what = format!("{invalid}: `render` blurs one picture; its depth is given by --depth-map FILE");
+        return (here == "render").then_some(what);
+    }
+    let is_bundle = |arg: &&OsString| !is_long && arg.as_bytes().starts_with(invalid.as_bytes()) && arg.len() > 2;
+    if let Some(file) = args.iter().find(is_bundle).map(|file| file.to_string_lossy()) {
+        return Some(format!("there is no option {invalid} ({file}); a file whose name begins with - is ./{file}"));
+    }
+    if is_long && here == "ctl set" {
         return Some(format!("{invalid}: settings are written without dashes, such as `bokehcam ctl set blur=3%`"));
     }
+    let name = invalid.trim_start_matches('-');
     let of = if here.is_empty() { "here".to_owned() } else { format!("of `{here}`") };
     let none = format!("there is no option {invalid} {of}");
     let has = |command: &Command, name: &str| command.get_arguments().any(|arg| has_name(arg, name));
@@ -67,10 +67,11 @@ fn unknown_option(error: &clap::Error, invalid: &str, args: &[OsString]) -> Opti
     collect_with_option(&program, name, &mut Vec::new(), &mut others);
     match others.len() {
         1..=MAX_COMMANDS => Some(format!("{none}: it is for {}", others.join(", "))),
-        0 => {
+        0 if is_long => {
             let suggested = error.get(ContextKind::SuggestedArg);
             Some(suggested.map_or_else(|| none.clone(), |near| format!("{none}, did you mean {near}?")))
         }
+        0 => Some(none),
         _ => Some(format!("{none}: it is for {} and others", others[..MAX_COMMANDS].join(", "))),
     }
 }

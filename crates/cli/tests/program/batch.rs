@@ -128,6 +128,9 @@ fn no_input_is_ever_replaced() {
             ran.refused(2, &["which is the input; choose another place"]);
         }
     }
+    fs::hard_link(home.path("shots/a.jpg"), home.path("other.jpg")).unwrap();
+    let ran = render(&home, &["shots/a.jpg", "--out", "other.jpg", "--force", "--quiet"]);
+    ran.refused(2, &["this is another name of shots/a.jpg"]);
     let after: Vec<Vec<u8>> =
         names(&home.path("shots")).iter().map(|name| fs::read(home.path("shots").join(name)).unwrap()).collect();
     assert_eq!(before, after);

@@ -19,10 +19,15 @@ fn numbers_below_zero_reach_the_option_that_they_are_for() {
         ("--depth-invalid", "-1", "0..=65535"),
         ("--f-number", "-2", "above 0"),
         ("--tilt", "-1", "0.6:0.1:15"),
-        ("--frames", "-1", "1.."),
+        ("--frames", "-1", "use a whole number from 1"),
+        ("--frames", "1e3", "use a whole number from 1"),
+        ("--frames", "0", "use a whole number from 1"),
+        ("--depth-scale", "1e300", "use a number above 0, up to 3.4"),
+        ("--depth-invalid", "NaN", "use a whole number from 0 to 65535"),
         ("--start", "-1", "seconds from 0"),
         ("--fps", "-5", "from 0.1 to 1000"),
-        ("--threads", "-2", "1..=1024"),
+        ("--threads", "-2", "from 1 to 1024"),
+        ("--threads", "0", "use a whole number from 1 to 1024"),
         ("--max-disparity", "-16", "16 to 256"),
         ("--budget-ms", "-1", "above 0"),
         ("--rank", "-3", "1 to 16"),
@@ -31,6 +36,13 @@ fn numbers_below_zero_reach_the_option_that_they_are_for() {
         ran.refused(2, &[said]);
         assert!(!ran.stderr.contains("tip:"), "{}", ran.stderr);
     }
+    Home::new().run(&["config", "dump", "--force=maybe"]).refused(2, &["use true or false"]);
+    let feather = ["render", "photo.png", "--out", "x.png", "--mask", "m.png", "--mask-feather", "NaN"];
+    Home::new().with_photo().run(&feather).refused(2, &["use a whole number from 0 to 200"]);
+    let short = Home::new().with_photo().run(&["render", "photo.png", "-o", "x.png"]);
+    short.refused(2, &["there is no option -o of `render`, did you mean --out?"]);
+    let open = Home::new().with_settings("blur = \"3\n").run(&["config", "dump"]);
+    open.refused(2, &["config.toml:1: write NAME = VALUE, and text in double quotes"]);
     assert!(Home::new().run(&["config", "dump", "--intensity", "-0.5"]).stdout.contains("intensity = -0.5 # flag"));
 }
 
@@ -40,6 +52,11 @@ fn a_mistyped_folder_is_a_folder_and_the_right_one_is_named() {
     let stream = |source: &str| home.run(&["stream", source, "--to", "null"]);
     stream("./recordng").refused(1, &["there is no such folder, did you mean ./recording?"]);
     stream("nowhere/at/all").refused(1, &["there is no such folder; use"]);
+    fs::write(home.path("clip.mp4"), "").unwrap();
+    stream("cilp.mp4").refused(1, &["'cilp.mp4' for '<SOURCE>': there is no such file, did you mean clip.mp4?"]);
+    let missing = stream("../nowhere/FILE.mp44");
+    assert!(missing.refused(1, &["there is no such file"]).trim_end().ends_with("there is no such file"));
+    stream("").refused(2, &["the name is empty: use "]);
     if cfg!(feature = "camera") {
         stream("recordng").refused(1, &["there is no camera 'recordng'", "did you mean the folder recording?"]);
     }
