@@ -21,7 +21,8 @@ show)
     echo "FragmentPath=$own"
     program=$(sed -n 's/^ExecStart="\{0,1\}\([^ "]*\).*/\1/p' "$own")
     echo "ExecStart={ path=$program ; argv[]=$program stream \$STREAM ; ignore_errors=no }"
-    grep '^Environment=' "$own" ;;
+    grep '^Environment=' "$own"
+    exit 0 ;;
 daemon-reload) grep -q '^ExecStart=' "$own" && echo loaded >"$here/loaded"; exit 0 ;;
 enable) echo enabled >"$here/enabled"; cp "$here/becomes" "$here/active" ;;
 disable) rm -f "$here/enabled" "$here/active" ;;
