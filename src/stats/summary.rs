@@ -5,7 +5,7 @@ use std::fmt;
 use super::FrameCounts;
 use super::report::{LiveSource, Percentiles, Report, StageMs};
 
-/// A picture of this size, in pixels, is blurred in real time by any machine that is sold today.
+/// Width and height that are suggested to a machine that is too slow, in pixels.
 const SMALL: (u32, u32) = (640, 480);
 
 impl Report {
