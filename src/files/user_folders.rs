@@ -16,9 +16,8 @@ pub struct Folders {
     pub videos: PathBuf,
 }
 
-/// The prefix of all names, and the suffixes of pictures and recordings.
+/// The prefix of all names, and the suffix of recordings.
 const PREFIX: &str = "bokehcam";
-const PICTURE_SUFFIX: &str = ".png";
 const VIDEO_SUFFIX: &str = ".mp4";
 /// Date and time between them.
 const TIME_FORMAT: &str = "%Y-%m-%d %H-%M-%S";
@@ -55,27 +54,17 @@ impl Folders {
         [self.videos.as_path()].into_iter().chain(pictures)
     }
 
-    /// Returns a path for a new recording: nothing exists there, and `is_taken` is false for it.
+    /// Returns a path for a new recording, named by date: neither a file nor a link is there, and `is_taken` is false for
+    /// it.
     pub fn unused_video_path(&self, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
-        unused_path(&self.videos, VIDEO_SUFFIX, is_taken)
+        let stem = timestamped_stem();
+        let path = |number: u32| match number {
+            1 => self.videos.join(format!("{stem}{VIDEO_SUFFIX}")),
+            _ => self.videos.join(format!("{stem}-{number}{VIDEO_SUFFIX}")),
+        };
+        let is_free = |path: &PathBuf| path.symlink_metadata().is_err() && !is_taken(path);
+        (1..u32::MAX).map(path).find(is_free).unwrap_or_else(|| path(u32::MAX))
     }
-
-    /// Returns a path for a new picture, which does not exist.
-    pub fn unused_picture_path(&self) -> PathBuf {
-        unused_path(&self.pictures, PICTURE_SUFFIX, |_| false)
-    }
-}
-
-/// Returns a path in the folder, named by date, with this suffix: neither a file nor a link is there, and `is_taken` is
-/// false for it.
-fn unused_path(folder: &Path, suffix: &str, is_taken: impl Fn(&Path) -> bool) -> PathBuf {
-    let stem = timestamped_stem();
-    let path = |number: u32| match number {
-        1 => folder.join(format!("{stem}{suffix}")),
-        _ => folder.join(format!("{stem}-{number}{suffix}")),
-    };
-    let is_free = |path: &PathBuf| path.symlink_metadata().is_err() && !is_taken(path);
-    (1..u32::MAX).map(path).find(is_free).unwrap_or_else(|| path(u32::MAX))
 }
 
 /// Returns the file name of a new file without extension: the local date and time.

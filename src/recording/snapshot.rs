@@ -1,19 +1,22 @@
 //! Snapshots: a blurred picture with its settings inside, optionally with its input files.
 //!
-//! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the
-//! picture before the blur, `NAME-depth.pfm` the depth that the blur used, in metres.
+//! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`, the version of the program
+//! (`Software`) and the kind of the source (`Source`). `NAME-color.png` is the picture before the blur, `NAME-depth.pfm`
+//! the depth that the blur used, in metres. The inputs are never inside `NAME.png`: whoever gives it away would give
+//! away the room behind the blur.
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 
 use super::coded;
 use super::decoders::guard;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::fault::png_fault;
-use super::still::{write_color, write_depth};
-use crate::files::atomic_file;
+use super::still::{PhotoFormat, photo_format, write_color, write_depth};
+use crate::files::trusted::absolute_env_path;
+use crate::files::{atomic_file, user_folders};
 use crate::frame::{ColorImage, DepthMap};
 
 /// The keyword of the PNG text with the settings.
@@ -28,6 +31,21 @@ pub struct Snapshot<'a> {
     pub sources: Option<(&'a ColorImage, Option<&'a DepthMap>)>,
     /// The settings, as flags without dashes and their values.
     pub settings: &'a [(&'static str, String)],
+    /// The kind of the source, such as `camera`: no name, as names contain paths and serial numbers.
+    pub source: &'a str,
+}
+
+impl Snapshot<'_> {
+    /// Returns the file of the picture, for `path` in messages.
+    fn encode(&self, path: &Path) -> Result<Vec<u8>, RecordingError> {
+        let unfit = |what: String| RecordingError::picture(path)(PictureFault::Encoding(what));
+        if self.settings.iter().any(|(_, value)| value.contains(['\n', '\r'])) {
+            return Err(unfit("a setting has a line break in it".to_owned()));
+        }
+        let mut png = Vec::new();
+        encode(self, &mut png).map_err(|error| unfit(error.to_string()))?;
+        Ok(png)
+    }
 }
 
 /// Saves a frame as `dir/stem.png` with its input files. If one of the names exists, uses the first free one of
@@ -37,15 +55,11 @@ pub struct Snapshot<'a> {
 /// # Errors
 /// The folder or a file cannot be written; `stem` is not a plain file name; a setting has a line break.
 pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, RecordingError> {
-    let unfit = |what: &str| RecordingError::picture(&dir.join(stem))(PictureFault::Encoding(what.to_string()));
+    let all = dir.join(stem);
     if Path::new(stem).file_name() != Some(stem.as_ref()) {
-        return Err(unfit("its name is not a file name"));
+        return Err(RecordingError::picture(&all)(PictureFault::Encoding("its name is not a file name".to_owned())));
     }
-    if snapshot.settings.iter().any(|(_, value)| value.contains(['\n', '\r'])) {
-        return Err(unfit("a setting has a line break in it"));
-    }
-    let mut png = Vec::new();
-    encode(snapshot, &mut png).map_err(|error| unfit(&error.to_string()))?;
+    let png = snapshot.encode(&all)?;
     fs::create_dir_all(dir).map_err(RecordingError::io("create", dir))?;
     for number in 1u32.. {
         let name = if number == 1 { format!("{stem}.png") } else { format!("{stem}-{number}.png") };
@@ -55,7 +69,23 @@ pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, Reco
             written => return written.map(|()| path),
         }
     }
-    Err(RecordingError::io("create", &dir.join(stem))(ErrorKind::AlreadyExists.into()))
+    Err(RecordingError::io("create", &all)(ErrorKind::AlreadyExists.into()))
+}
+
+/// Saves a frame as the file `path`, as [`save`] does. In a format other than PNG there is only the picture, without
+/// settings. Creates the folder.
+///
+/// # Errors
+/// The extension is that of no picture; one of the files exists, or cannot be written; a setting has a line break.
+pub fn save_as(path: &Path, snapshot: &Snapshot) -> Result<(), RecordingError> {
+    let png = match photo_format(path)? {
+        PhotoFormat::Png => Some(snapshot.encode(path)?),
+        _ => None,
+    };
+    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+        fs::create_dir_all(dir).map_err(RecordingError::io("create", dir))?;
+    }
+    png.map_or_else(|| write_color(path, snapshot.picture, false), |png| write(path, snapshot, &png))
 }
 
 /// Writes the picture and its input files, or none of them.
@@ -107,11 +137,28 @@ pub fn read_settings(path: &Path) -> Result<Vec<(String, String)>, RecordingErro
     read_text(path).and_then(|text| parse_settings(&text)).map_err(RecordingError::picture(path))
 }
 
+/// The prefixes of settings that name a file, and the prefix of a path in the home folder.
+const FILES: [&str; 2] = ["image:", "video:"];
+const HOME: &str = "~/";
+
+/// Writes the path of a file that a setting names so that it is found from any folder, and without the user's name.
+fn hide_home(value: &str) -> String {
+    let file = FILES.iter().find_map(|kind| Some((kind, path::absolute(value.strip_prefix(kind)?).ok()?)));
+    file.map_or_else(|| value.to_owned(), |(kind, file)| format!("{kind}{}", user_folders::format_path(&file)))
+}
+
+/// Undoes [`hide_home`], for the present user.
+fn resolve_home(value: &str) -> String {
+    let inside = FILES.iter().find_map(|kind| Some((kind, value.strip_prefix(kind)?.strip_prefix(HOME)?)));
+    let file = inside.and_then(|(kind, inside)| Some((kind, absolute_env_path("HOME")?.join(inside))));
+    file.map_or_else(|| value.to_owned(), |(kind, file)| format!("{kind}{}", file.display()))
+}
+
 /// Parses lines of `--name=value`.
 fn parse_settings(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     let setting = |line: &str| {
         let (name, value) = line.strip_prefix("--")?.split_once('=')?;
-        Some((name.to_owned(), value.to_owned()))
+        Some((name.to_owned(), resolve_home(value)))
     };
     let short = |line: &str| line.chars().take(40).collect::<String>();
     let parsed = |line| {
@@ -138,14 +185,54 @@ fn read_text(path: &Path) -> Result<String, PictureFault> {
 
 /// Appends the blurred picture to `file` as PNG, with the settings as text.
 fn encode(snapshot: &Snapshot, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
-    let lines = snapshot.settings.iter().map(|(name, value)| format!("--{name}={value}\n"));
+    let lines = snapshot.settings.iter().map(|(name, value)| format!("--{name}={}\n", hide_home(value)));
     let mut encoder = png::Encoder::new(file, snapshot.picture.width, snapshot.picture.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Paeth);
     encoder.add_itxt_chunk(KEYWORD.to_string(), lines.collect())?;
+    encoder.add_text_chunk("Software".to_string(), concat!("bokehcam ", env!("CARGO_PKG_VERSION")).to_string())?;
+    encoder.add_text_chunk("Source".to_string(), snapshot.source.to_string())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&snapshot.picture.rgb)?;
     writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snapshot_tells_what_made_it_and_not_who() {
+        let folder = tempfile::tempdir().unwrap();
+        let home = absolute_env_path("HOME").expect("tests have a home");
+        let wall = format!("image:{}", home.join("walls/sea.jpg").display());
+        let here = format!("image:{}", path::absolute("heart.png").unwrap().display());
+        let settings =
+            [("behind", wall.clone()), ("aperture", "image:heart.png".to_owned()), ("rim", "0.5".to_owned())];
+        let picture = ColorImage::new(4, 3);
+        let shot = Snapshot { picture: &picture, sources: None, settings: &settings, source: "camera" };
+        let path = folder.path().join("new/me.png");
+        save_as(&path, &shot).unwrap();
+        let info = coded::read_png_info(&path).unwrap();
+        let text = info.utf8_text[0].get_text().unwrap();
+        assert!(text.contains("--behind=image:~/walls/sea.jpg\n"), "{text}");
+        let plain: Vec<_> = info.uncompressed_latin1_text.iter().map(|chunk| (&*chunk.keyword, &*chunk.text)).collect();
+        assert_eq!(plain, [("Software", concat!("bokehcam ", env!("CARGO_PKG_VERSION"))), ("Source", "camera")]);
+        let read = read_settings(&path).unwrap();
+        let read: Vec<_> = read.iter().map(|(name, value)| (&**name, &**value)).collect();
+        assert_eq!(read, [("behind", &*wall), ("aperture", &*here), ("rim", "0.5")]);
+
+        // Other formats hold the picture alone; nothing is replaced.
+        let jpeg = folder.path().join("me.jpg");
+        save_as(&jpeg, &shot).unwrap();
+        assert!(read_settings(&jpeg).is_err());
+        for taken in [&path, &jpeg] {
+            let before = fs::read(taken).unwrap();
+            assert!(matches!(save_as(taken, &shot), Err(RecordingError::Exists { .. })));
+            assert_eq!(fs::read(taken).unwrap(), before);
+        }
+        assert!(save_as(&folder.path().join("none/me.txt"), &shot).is_err() && !folder.path().join("none").exists());
+    }
 }

@@ -37,6 +37,21 @@ pub enum Kind {
     Synthetic,
 }
 
+impl Kind {
+    /// Returns its name in one word, for metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Camera => "camera",
+            Kind::Recording => "recording",
+            Kind::Demo => demo::NAME,
+            Kind::Photo => "photo",
+            Kind::Video => "video",
+            Kind::Stdin => "stdin",
+            Kind::Synthetic => SYNTHETIC,
+        }
+    }
+}
+
 /// A camera: the name from the user, and the device node that it resolved to.
 #[cfg(feature = "camera")]
 #[derive(Clone, Debug, PartialEq)]

@@ -65,6 +65,13 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     OutputFailed(String),
+    /// The snapshot has its settings, but not the picture that it was made from.
+    #[error(
+        "{}: there is no such file: a snapshot holds its settings, and a preview saves its picture beside it if \
+         Reproducible snapshots, under More, is on; or use the settings for another picture: render PICTURE --like \
+         NAME.png", .0.display()
+    )]
+    NoOriginal(PathBuf),
     /// Some of many pictures were not rendered; the reasons are printed.
     #[error("{0}")]
     Incomplete(String),

@@ -70,7 +70,7 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
-    /// Save the next picture
+    /// Save the next picture, with its settings if it is a PNG: `render --like` uses them
     Snapshot {
         /// The file (PNG or JPEG), which must not exist [default: by date, in your folder of pictures]
         #[arg(id = "file", long = "to", value_name = "FILE")]

@@ -155,7 +155,8 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
         let settings = Patch::from_look(&look.for_frame(&field, Some(quality))).values();
         let depth = matches!(field, CocField::Depth(_)).then_some(&map);
-        let shot = Snapshot { picture: &picture, sources: Some((&color, depth)), settings: &settings };
+        let shot =
+            Snapshot { picture: &picture, sources: Some((&color, depth)), settings: &settings, source: "camera" };
         let path = snapshot::save(&shots, name, &shot).unwrap();
         assert_eq!(read_color(&path).unwrap(), picture);
         let out = path.with_extension("again.png");
@@ -195,7 +196,7 @@ fn a_snapshots_settings_can_be_given_to_another_picture() {
     let look = Look::with_effect(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
     let settings = Patch::from_look(&look.for_frame(&field, None)).values();
-    let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings };
+    let shot = Snapshot { picture: &picture, sources: Some((&color, None)), settings: &settings, source: "camera" };
     let like = snapshot::save(home.0.path(), "x", &shot).unwrap();
     write_color(&home.path("other.png"), &three_depths_as_picture(), false).unwrap();
     home.run(&["render", "other.png", "--like", like.to_str().unwrap(), "--backend", "cpu", "--out", "out.png"]).done();
@@ -212,7 +213,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
     let at = |name: &str| home.path(name);
     let (color, map) = (noise(24, 18), three_depths(24, 18));
     let save = |name: &str, settings: &[(&'static str, String)]| {
-        let shot = Snapshot { picture: &color, sources: Some((&color, Some(&map))), settings };
+        let shot = Snapshot { picture: &color, sources: Some((&color, Some(&map))), settings, source: "camera" };
         snapshot::save(home.0.path(), name, &shot).unwrap();
     };
     write_color(&at("plain.png"), &color, false).unwrap();
@@ -233,7 +234,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
         ("short.png", 1, "short.png: "),
         ("alien.png", 2, "alien.png: its setting 'mirror' is not a setting of the look"),
         ("bad.png", 2, "from 0 to 1"),
-        ("lone.png", 1, "lone-color.png: there is no such file"),
+        ("lone.png", 1, "lone-color.png: there is no such file: a snapshot holds its settings, and a preview saves"),
         ("depthless.png", 2, "needs depth"),
     ] {
         home.run(&["render", "--like", name, "--out", "out.png"]).refused(code, &[said]);
@@ -245,7 +246,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
 fn a_snapshot_is_whole_or_not_there() {
     let home = Home::new().with_settings("");
     let color = noise(8, 6);
-    let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &[] };
+    let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &[], source: "camera" };
     for (dir, stem, shot) in [
         (home.path("a"), "../x", shot),
         (home.path("a"), "", shot),

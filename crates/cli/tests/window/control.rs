@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
+use bokehcam::recording::snapshot;
 use bokehcam::recording::still::read_color;
 use serde_json::Value;
 
@@ -61,6 +62,9 @@ fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
 
     program.ctl(&["snapshot", "--to", "me.png"]).done();
     assert_eq!(read_color(&program.home().join("me.png")).unwrap().size(), (640, 360));
+    let settings = snapshot::read_settings(&program.home().join("me.png")).unwrap();
+    let has = |name: &str, value: &str| settings.contains(&(name.to_owned(), value.to_owned()));
+    assert!(has("rim", "0.5") && has("quality", "balanced"), "{settings:?}");
 
     program.ctl(&["off"]).done();
     window.until("nothing of the person", |image| !is_photograph(image));

@@ -52,6 +52,9 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         // clap requires an image without `--like`.
         (image, _) => (image.clone().unwrap_or_default(), None),
     };
+    if command.image.is_none() && !image.exists() {
+        return Err(CliError::NoOriginal(image));
+    }
     let mut photo = Photo::read(&image)?;
     photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.

@@ -88,8 +88,9 @@ pub struct RenderCommand {
     #[arg(long, value_name = "PX", requires = "mask", default_value_t = 0, hide_default_value = true,
           value_parser = whole_number_parser(0..=MAX_MASK_PX))]
     mask_feather: u16,
-    /// Use the settings of a snapshot of the preview; flags override them. Without IMAGE, its NAME-color.png is
-    /// blurred, and without --depth-map by its NAME-depth.pfm, which gives the same picture again
+    /// Use the settings of a snapshot, of a preview or a stream; flags override them. Without IMAGE, its NAME-color.png is
+    /// blurred, and without --depth-map by its NAME-depth.pfm, which a preview with Reproducible snapshots saves beside
+    /// it: this gives the same picture again
     #[arg(long, value_name = "NAME.png")]
     like: Option<PathBuf>,
     /// File for the result, .png, .jpg, .tif or .webp. For many pictures a folder: each result has the name and kind of its picture.

@@ -9,7 +9,6 @@ use std::time::Duration;
 
 use crate::controlled::{CommandLineRules, to_answer};
 use crate::error::CliError;
-use crate::files::create_parent_folder;
 use crate::log;
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
@@ -18,11 +17,11 @@ use bokehcam::computing::ExecutorFactory;
 use bokehcam::control::bus;
 use bokehcam::control::{Answer, Claim, Server, Status};
 use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
-use bokehcam::files::user_folders::Folders;
+use bokehcam::files::user_folders::{Folders, timestamped_stem};
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Patch};
 use bokehcam::pipeline::{ChangeSender, Progress};
-use bokehcam::recording::still;
+use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::sink::ShutterControl;
 use bokehcam::stats::FrameRateMeter;
 
@@ -223,11 +222,16 @@ impl ControllableRun for Stream {
         let picture = self.run.shutter.copy_next_picture(PICTURE_TIMEOUT);
         let picture =
             picture.ok_or_else(|| Answer::failed(format!("no picture came for {} s", PICTURE_TIMEOUT.as_secs())))?;
-        let path = to.map_or_else(|| Folders::from_user_dirs().unused_picture_path(), Path::to_owned);
-        let write = || -> Result<(), CliError> {
-            create_parent_folder(&path)?;
-            Ok(still::write_color(&path, &picture, false)?)
+        // The focus stays a rule, as the picture comes without its distance.
+        let look = lock(&self.look).clone();
+        let quality = self.run.stats.quality().or(look.quality);
+        let settings = Patch::from_look(&Look { quality, ..look }).values();
+        let source = self.run.facts.kind.name();
+        let snapshot = Snapshot { picture: &picture, sources: None, settings: &settings, source };
+        let saved = match to {
+            Some(path) => snapshot::save_as(path, &snapshot).map(|()| path.to_owned()),
+            None => snapshot::save(&Folders::from_user_dirs().pictures, &timestamped_stem(), &snapshot),
         };
-        write().map(|()| path.clone()).map_err(|error| to_answer(&error))
+        saved.map_err(|error| to_answer(&error.into()))
     }
 }

@@ -9,9 +9,11 @@ mod refusals;
 mod runs;
 mod world;
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bokehcam::budget::Quality;
+use bokehcam::recording::snapshot;
 use bokehcam::recording::still::read_color;
 use serde_json::json;
 
@@ -153,13 +155,31 @@ fn a_picture_is_saved_where_it_was_asked_for() {
     let picture = read_color(&world.path("here/me.png")).unwrap();
     assert_eq!(picture.size(), (640, 360));
     assert!(picture.rgb.iter().any(|&value| value > 100), "not the card");
+    // It holds its settings, for any other picture; the picture without blur is not given away with it.
+    let settings = snapshot::read_settings(&world.path("here/me.png")).unwrap();
+    for (name, value) in [("effect", "blur"), ("rim", "0.2")] {
+        assert!(settings.contains(&(name.to_owned(), value.to_owned())), "{settings:?}");
+    }
+    let photo = format!("{PORTRAIT}/rgb/000000.png");
+    world.run(&["render", &photo, "--like", "me.png", "--out", "like.png", "--backend", "cpu"]).done();
+    let given = ["render", &photo, "--effect", "blur", "--out", "given.png", "--backend", "cpu"];
+    let quality = settings.iter().find(|(name, _)| name == "quality").unwrap();
+    world.run(&[&given[..], &["--quality", &quality.1]].concat()).done();
+    let read = |name: &str| read_color(&world.path("here").join(name)).unwrap();
+    assert!(read("like.png") == read("given.png"));
+    world
+        .run(&["render", "--like", "me.png", "--out", "again.png"])
+        .refused(1, &["me-color.png: there is no such file", "Reproducible snapshots", "render PICTURE --like"]);
     let before = std::fs::read(world.path("here/me.png")).unwrap();
+    world.ctl(&["snapshot", "--to", "me.jpg"]).done();
     world.ctl(&["snapshot", "--to", "me.png"]).refused(1, &["me.png exists: choose another name"]);
     assert_eq!(std::fs::read(world.path("here/me.png")).unwrap(), before);
     world.ctl(&["snapshot", "--to", "me.txt"]).refused(1, &["me.txt"]);
     if cfg!(feature = "window") {
         let by_date = world.ctl(&["snapshot"]).printed();
         assert!(by_date.starts_with(world.path("pictures/bokehcam ").to_str().unwrap()), "{by_date}");
+        let settings = snapshot::read_settings(Path::new(by_date.trim_end())).unwrap();
+        assert!(settings.contains(&("effect".to_owned(), "blur".to_owned())), "{settings:?}");
     }
     world.ctl(&["off"]).done();
     world.ctl(&["snapshot", "--to", "no.png"]).refused(1, &["it is off"]);

@@ -23,7 +23,7 @@ fn absurd_radii_are_refused_wherever_they_come_from() {
     home.run(&["render", "photo.png", "--config", "c.toml", "--out", "out.png"]).refused(2, &["c.toml:2: ", range]);
     let color = still::read_color(&home.path("photo.png")).unwrap();
     let settings = [("effect", "blur".to_string()), ("coc-at-infinity", "100000".to_string())];
-    let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &settings };
+    let shot = Snapshot { picture: &color, sources: Some((&color, None)), settings: &settings, source: "camera" };
     snapshot::save(home.0.path(), "shot", &shot).unwrap();
     home.run(&["render", "--like", "shot.png", "--out", "out.png"]).refused(2, &["--like shot.png", range]);
 }

@@ -1,5 +1,7 @@
 //! Looks of a session: applying new ones, and finding the one of a displayed frame.
 
+use std::str::FromStr;
+
 use super::super::{SaveOptions, SessionEvent, Still, held};
 use super::SessionWorker;
 use bokehcam::control::Answer;
@@ -7,7 +9,7 @@ use bokehcam::engine::Images;
 use bokehcam::files::user_folders as folders;
 use bokehcam::look::{Look, Patch};
 use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::recording::still::write_color;
+use bokehcam::source::{Kind, SourceName};
 
 /// Number of recent looks kept for snapshots: a frame in flight has one of the last few.
 const MAX_KEPT_LOOKS: usize = 512;
@@ -63,13 +65,10 @@ impl SessionWorker {
         let settings = Patch::from_look(&look.for_saved_frame(&still.coc, still.quality)).values();
         let Images { color, depth, blurred: picture } = &still.images;
         let sources = with_sources.then_some((color, depth.as_ref()));
-        let snapshot = Snapshot { picture, sources, settings: &settings };
+        let source = SourceName::from_str(&self.config.source).map_or(Kind::default(), |name| name.kind()).name();
+        let snapshot = Snapshot { picture, sources, settings: &settings, source };
         let saved = match request.as_ref().and_then(|request| request.to.as_deref()) {
-            Some(path) => {
-                // If that fails, writing reports the error.
-                let _ = path.parent().map(std::fs::create_dir_all);
-                write_color(path, picture, false).map(|()| path.to_owned())
-            }
+            Some(path) => snapshot::save_as(path, &snapshot).map(|()| path.to_owned()),
             None => snapshot::save(&self.config.folders.pictures, &folders::timestamped_stem(), &snapshot),
         };
         let answer = match saved {

@@ -103,8 +103,12 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     assert!(!open(&other).unwrap().has_depth());
     std::fs::rename(folder.path().join("holiday-depth.png"), folder.path().join("other.depth.png")).unwrap();
     assert!(open(&other).unwrap().has_depth());
-    let kept =
-        snapshot::Snapshot { picture: &ColorImage::new(40, 30), sources: Some((&color, Some(&depth))), settings: &[] };
+    let kept = snapshot::Snapshot {
+        picture: &ColorImage::new(40, 30),
+        sources: Some((&color, Some(&depth))),
+        settings: &[],
+        source: "camera",
+    };
     let kept = snapshot::save(folder.path(), "kept", &kept).unwrap();
     let mut opened = open(&kept).unwrap();
     assert!(opened.has_depth());
