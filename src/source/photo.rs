@@ -1,5 +1,6 @@
 //! Photos, and the depth files next to them.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use super::options::Depth;
 use super::{DepthChoice, DepthOrigin, Findings, OpenRequest, Options, Source, SourceError, SourceName};
 use crate::depth::FrameInput;
 use crate::depth::focus::FocusRule;
+use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::Look;
 use crate::recording::depth_file::{self, DepthFile, DepthInside, Distances, EXTENSIONS};
@@ -189,8 +191,20 @@ impl From<Distances> for DepthOrigin {
 
 /// Returns the depth file next to a photo.
 fn find_depth_file(photo: &Path) -> Option<PathBuf> {
-    let stem = photo.file_stem()?.to_str()?;
-    let stem = stem.strip_suffix(COLOR).unwrap_or(stem);
-    let name = |(ending, extension): (&str, &str)| photo.with_file_name(format!("{stem}{ending}.{extension}"));
-    DEPTH.iter().flat_map(|ending| EXTENSIONS.map(|extension| name((ending, extension)))).find(|file| file.is_file())
+    depth_file_paths(photo).find(|file| file.is_file())
+}
+
+/// Returns whether `file` would be found as the depth file of `photo`, if it existed.
+pub fn is_depth_file_of(file: &Path, photo: &Path) -> bool {
+    let file = place::resolve_links(file);
+    depth_file_paths(photo).any(|path| place::resolve_links(&path) == file)
+}
+
+/// Returns the paths of the depth file of a photo, in the order of the search.
+fn depth_file_paths(photo: &Path) -> impl Iterator<Item = PathBuf> {
+    let stem = photo.file_stem().and_then(OsStr::to_str).map(|stem| stem.strip_suffix(COLOR).unwrap_or(stem));
+    let name = move |stem: &str, ending: &str, extension| photo.with_file_name(format!("{stem}{ending}.{extension}"));
+    let of_stem =
+        move |stem| DEPTH.iter().flat_map(move |ending| EXTENSIONS.map(|extension| name(stem, ending, extension)));
+    stem.into_iter().flat_map(of_stem)
 }

@@ -206,11 +206,17 @@ fn the_range_is_rounded_up_and_fits_the_pictures() {
 #[test]
 fn what_does_not_fit_is_refused_in_one_line() {
     let desk = Desk::new();
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 11] = [
         (&[], "--out"),
         (&["--out", "d.jpg"], "--out FILE ends with .pfm or .png"),
         (&["--out", "d.pfm", "--preview", "d.gif"], "--preview FILE.png"),
         (&["--out", "d.png", "--preview", "d.png"], "name the same file"),
+        // Every command would take the colours for depth.
+        (
+            &["--out", "d.pfm", "--preview", "left-depth.png"],
+            "the depth map of left.png; use another, such as left-preview.png",
+        ),
+        (&["--out", "d.pfm", "--preview", "./right.depth.png"], "the depth map of right.png"),
         (&["--out", "d.pfm", "--metres"], "--metres needs the stereo geometry: give --calib FILE"),
         (&["--out", "d.pfm", "--focal-px", "700"], "--baseline-m"),
         (&["--out", "d.pfm", "--baseline-m", "0.1"], "--baseline-m needs --focal-px, or --calib FILE"),

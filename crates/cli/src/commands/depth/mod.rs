@@ -27,6 +27,7 @@ use bokehcam::recording::geometry::Geometry;
 use bokehcam::recording::still::{self, MapFormat};
 use bokehcam::source::calib::{self, PairCalibration};
 use bokehcam::source::options::DEPTH_SCALE;
+use bokehcam::source::photo;
 
 use preview::colorize_disparity;
 
@@ -208,7 +209,19 @@ impl DepthCommand {
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name the same file; each needs its own");
         }
-        for read in [&self.left].into_iter().chain(&self.right).chain(&self.calib) {
+        let inputs = || [&self.left].into_iter().chain(&self.right);
+        let hides = |preview: &&PathBuf| inputs().find(|photo| photo::is_depth_file_of(preview, photo));
+        if let Some((preview, photo)) = self.preview.as_ref().and_then(|preview| Some((preview, hides(&preview)?))) {
+            let stem = photo.file_stem().unwrap_or_default().display();
+            return Err(CliError::Usage(format!(
+                "--preview {}: a picture in colours by this name would be taken for the depth map of {}; use another, such \
+                 as {}",
+                preview.display(),
+                photo.display(),
+                preview.with_file_name(format!("{stem}-preview.png")).display()
+            )));
+        }
+        for read in inputs().chain(&self.calib) {
             refuse_overwriting_source("--out", &self.out, read)?;
             self.preview.as_ref().map_or(Ok(()), |preview| refuse_overwriting_source("--preview", preview, read))?;
         }
