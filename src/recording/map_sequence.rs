@@ -39,14 +39,16 @@ pub fn is_map_folder(dir: &Path) -> bool {
 
 impl MapSequence {
     /// Opens the maps in `dir` for these pictures: by name where pictures have names, else in the order of the maps'
-    /// names, where a missing number is a missing map. Returns it with what was assumed, a line each. The range of relative
-    /// depth is that of all maps, estimated from some.
+    /// names, where a missing number is a missing map. Only the first `played` pictures need a map; `None` means all of
+    /// them. Returns it with what was assumed, a line each. The range of relative depth is that of all maps, estimated from
+    /// some.
     ///
     /// # Errors
-    /// There are no maps, or another number of them than of pictures; no map can be read, or its unit is unclear.
+    /// There are no maps, or too few or too many for the pictures; no map can be read, or its unit is unclear.
     pub fn open(
         dir: &Path,
         pictured: Pictured,
+        played: Option<u64>,
         options: depth_file::Options,
     ) -> Result<(Self, Vec<String>), RecordingError> {
         let found = find_files(dir, &depth_file::EXTENSIONS, |_| true)?;
@@ -59,7 +61,7 @@ impl MapSequence {
             Pictured::Files(stems) => Some(stems.len() as u64),
         };
         let how = if by_stem.is_some() { "by the names of the pictures" } else { "in the order of their names" };
-        let names = by_stem.map_or_else(|| pair_by_order(dir, &found, count), Ok)?;
+        let names = by_stem.map_or_else(|| pair_by_order(dir, &found, count, played), Ok)?;
         let missing = names.iter().collect::<HashSet<_>>().difference(&found.iter().collect()).count();
         let files: Vec<_> = names.iter().map(|name| dir.join(name)).collect();
         let samples = || files.iter().step_by(files.len().div_ceil(RANGE_SAMPLES).max(1));
@@ -126,13 +128,21 @@ fn map_count(dir: &Path, maps: u64, pictures: u64) -> RecordingError {
     RecordingError::MapCount { dir: dir.to_owned(), maps, pictures }
 }
 
-/// Returns the name of the map of each of `frames` frames: in this order, or by number if some are missing.
-fn pair_by_order(dir: &Path, names: &[String], frames: Option<u64>) -> Result<Vec<String>, RecordingError> {
+/// Returns the name of the map of each of `frames` frames, or of the first `played` of them at least: in this order, or by
+/// number if some are missing.
+fn pair_by_order(
+    dir: &Path,
+    names: &[String],
+    frames: Option<u64>,
+    played: Option<u64>,
+) -> Result<Vec<String>, RecordingError> {
     let filled = fill_gaps(names);
-    match frames {
-        Some(frames) if names.len() as u64 == frames => Ok(names.to_vec()),
-        Some(frames) if filled.len() as u64 != frames => Err(map_count(dir, names.len() as u64, frames)),
-        _ => Ok(filled),
+    let Some(frames) = frames else { return Ok(filled) };
+    let needed = played.map_or(frames, |played| played.min(frames));
+    match (names.len() as u64, filled.len() as u64) {
+        (count, _) if count == frames || count == needed => Ok(names.to_vec()),
+        (_, count) if (needed..=frames).contains(&count) => Ok(filled),
+        (count, _) => Err(map_count(dir, count, needed)),
     }
 }
 
@@ -195,7 +205,9 @@ mod tests {
 
     #[test]
     fn frames_pair_in_order_and_a_missing_number_is_a_missing_map() {
-        let pair = |names: &[&str], frames| pair_by_order(Path::new("maps"), &owned(names), frames);
+        let pair_some =
+            |names: &[&str], frames, played| pair_by_order(Path::new("maps"), &owned(names), frames, played);
+        let pair = |names: &[&str], frames| pair_some(names, frames, None);
         let whole = ["d-01.png", "d-02.png", "d-03.png"];
         assert_eq!(pair(&whole, Some(3)).unwrap(), whole);
         assert_eq!(pair(&whole, None).unwrap(), whole);
@@ -211,6 +223,14 @@ mod tests {
         }
         let said = pair(&gap, Some(9)).unwrap_err().to_string();
         assert!(said.contains("3 depth maps") && said.contains('9'), "{said}");
+        // Frames that are not played need none.
+        assert_eq!(pair_some(&whole, Some(180), Some(3)).unwrap(), whole);
+        assert_eq!(pair_some(&whole, Some(180), Some(2)).unwrap(), whole);
+        assert_eq!(pair_some(&gap, Some(180), Some(4)).unwrap(), filled);
+        assert_eq!(pair_some(&whole, Some(3), Some(9)).unwrap(), whole);
+        let said = pair_some(&whole, Some(180), Some(5)).unwrap_err().to_string();
+        assert!(said.contains("3 depth maps for 5 pictures"), "{said}");
+        assert!(pair_some(&whole, Some(2), Some(1)).is_err(), "maps of something longer");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::opened::recorded_depth_origin;
 use super::orientation::SourceTransform;
 use super::{
-    DepthChoice, DepthOrigin, OpenRequest, Options, Source, SourceError, SourceName, options, registration,
+    DepthChoice, DepthOrigin, Frames, OpenRequest, Options, Source, SourceError, SourceName, options, registration,
     single_camera, video,
 };
 use crate::capture::{CaptureError, FrameData};
@@ -89,7 +89,8 @@ fn add_map_sequence(
             ));
         }
     };
-    let (maps, notes) = MapSequence::open(folder, pictured, request.options.depth.of_photo())?;
+    let played = last_played_frame(&request.options.frames, source.camera.info().period_ns);
+    let (maps, notes) = MapSequence::open(folder, pictured, played, request.options.depth.of_photo())?;
     let depth_from = maps.distances().into();
     request.check_relative_depth(depth_from)?;
     source.findings.notes.extend(notes);
@@ -98,6 +99,15 @@ fn add_map_sequence(
         if depth_from.is_relative() { None } else { registration::open(&request.options.depth, Some(size))? };
     let first_depth = maps.read(0, size).ok().map(|file| file.map);
     Ok(Source { depth: Some(Box::new(SequenceDepth::new(maps, registration))), depth_from, first_depth, ..source })
+}
+
+/// Returns the number of frames up to the last one that is played, of a source with a frame every `period_ns`; `None` if
+/// all are.
+fn last_played_frame(frames: &Frames, period_ns: u64) -> Option<u64> {
+    // Of frames with uneven times, there may be more: each that lacks a map says so.
+    let before = |seconds: f64| (seconds * 1e9 / period_ns as f64).ceil() as u64;
+    let by_count = frames.frames.map(|count| before(frames.start.unwrap_or(0.0)).saturating_add(count));
+    [by_count, frames.end.map(before)].into_iter().flatten().min()
 }
 
 /// Opens the depth camera `name` with scale and registration from the options.

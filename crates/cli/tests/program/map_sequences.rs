@@ -86,6 +86,11 @@ fn each_picture_has_the_map_of_its_name_as_if_it_were_beside_it() {
     assert!(ran.code == 0 && ran.stderr.contains("maps/d3.png"), "{ran:?}");
     fs::remove_file(home.path("maps/d4.png")).unwrap();
     stream(&home, &missing).failed(1, &["maps: 3 depth maps for 5 pictures"]);
+    // Pictures that are not played need none.
+    for played in [&["--frames", "3"][..], &["--end", "0.09"], &["--start", "0.05", "--frames", "1"]] {
+        stream(&home, &[&missing[..], played].concat()).done();
+    }
+    stream(&home, &[&missing[..], &["--frames", "4"]].concat()).failed(1, &["maps: 3 depth maps for 4 pictures"]);
     fs::remove_dir_all(home.path("maps")).unwrap();
     fs::create_dir(home.path("maps")).unwrap();
     stream(&home, &missing).failed(1, &["maps"]);
@@ -144,6 +149,7 @@ fn each_frame_of_a_video_has_its_map() {
     fs::remove_file(maps().nth(4).unwrap()).unwrap();
     let short = [&["clip.mp4", "--to", "video/"], &given[..]].concat();
     stream(&home, &short).failed(1, &["maps: 3 depth maps for 5 pictures"]);
+    stream(&home, &[&short[..], &["--frames", "2"]].concat()).done();
     stream(&home, &[&short[..], &["--fps", "10"]].concat()).refused(2, &["--fps changes the number of frames"]);
 }
 
