@@ -11,6 +11,7 @@ counts the inner corners, along rows and columns.
 Needs `pip install opencv-python-headless` (4.5 or later).
 """
 import argparse
+import os
 import sys
 
 import cv2
@@ -100,14 +101,21 @@ def main():
     if rms > 1:
         print("the RMS error is too large: leave out blurred pictures, and check that the board is flat", file=sys.stderr)
     if t[0, 0] > 0:
-        print("the left camera stands on the right: swap --left and --right", file=sys.stderr)
+        swap = "the halves of the pictures" if args.side_by_side else "--left and --right"
+        sys.exit(f"the left camera stands on the right: swap {swap}; {args.out} is not written")
 
-    file = cv2.FileStorage(args.out, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_FORMAT_YAML)
+    # A calibration that is there is replaced by a whole one only.
+    folder, name = os.path.split(args.out)
+    part = os.path.join(folder, f".part-{name}")
+    file = cv2.FileStorage(part, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_FORMAT_YAML)
+    if not file.isOpened():
+        sys.exit(f"{args.out}: cannot be written")
     file.write("image_width", size[0])
     file.write("image_height", size[1])
     for key, value in (("M1", m1), ("D1", d1), ("M2", m2), ("D2", d2), ("R", r), ("T", t)):
         file.write(key, value)
     file.release()
+    os.replace(part, args.out)
     print(f"wrote {args.out}; T is in metres")
 
 
