@@ -1,27 +1,43 @@
 //! Searches the data folders of the user and the system for networks.
 
 use std::env;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{KnownNetwork, MAX_BYTES, Task};
-use crate::files::{data, input};
+use crate::files::{data, input, trusted};
 
-/// Returns the folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, in `share` next to the folder of
-/// the program (as unpacked or installed), and in each of `$XDG_DATA_DIRS`.
+/// Names the folder of networks that takes the place of those beside the program.
+const VARIABLE: &str = "BOKEHCAM_MODELS";
+
+/// Returns the folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, those of the program
+/// ([`program_folders`]) or `$BOKEHCAM_MODELS` in their place, and `bokehcam/models` in each of `$XDG_DATA_DIRS`.
 pub fn model_folders() -> Vec<PathBuf> {
-    let bundled = env::current_exe().ok().and_then(|program| Some(program.parent()?.parent()?.join("share")));
+    let of_data = |folder: PathBuf| folder.join("bokehcam/models");
+    let of_program = match trusted::absolute_env_path(VARIABLE) {
+        Some(folder) => vec![folder],
+        None => env::current_exe().map_or_else(|_| Vec::new(), |program| program_folders(&program)),
+    };
     let mut folders = Vec::new();
     for folder in data::user_data_dir()
+        .map(of_data)
         .into_iter()
-        .chain(bundled)
-        .chain(data::system_data_dirs())
-        .map(|folder| folder.join("bokehcam/models"))
+        .chain(of_program)
+        .chain(data::system_data_dirs().into_iter().map(of_data))
     {
         if !folders.contains(&folder) {
             folders.push(folder);
         }
     }
     folders
+}
+
+/// Returns the folders of a program's own networks: `share/bokehcam/models` beside its folder, as unpacked or installed;
+/// and `models` in and beside its folder, as in a build, where `scripts/setup build` puts them. Only networks with a known
+/// checksum are used, so that it does not matter who can write there.
+fn program_folders(program: &Path) -> Vec<PathBuf> {
+    let near: Vec<&Path> = program.ancestors().skip(1).take(2).collect();
+    let installed = near.get(1).map(|folder| folder.join("share/bokehcam/models"));
+    installed.into_iter().chain(near.iter().map(|folder| folder.join("models"))).collect()
 }
 
 /// Returns the installed known networks with their files, the best of each task first.
@@ -59,4 +75,22 @@ pub fn find_best(task: Task) -> Option<PathBuf> {
 /// Returns the best known network for a task in these folders.
 pub fn find_best_in(folders: Vec<PathBuf>, task: Task) -> Option<PathBuf> {
     find_known_in(folders).into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_finds_its_networks_where_packages_and_builds_put_them() {
+        let folders = |program: &str| program_folders(Path::new(program));
+        let is_in = |program: &str, folder: &str| folders(program).contains(&PathBuf::from(folder));
+        assert!(is_in("/usr/local/bin/bokehcam", "/usr/local/share/bokehcam/models"));
+        for program in ["/b/target/release/bokehcam", "/b/target/debug/bokehcam", "/b/target/bokehcam"] {
+            assert!(is_in(program, "/b/target/models"), "{program}");
+        }
+        // Tests of a build are not the program.
+        assert!(!is_in("/b/target/debug/deps/bokehcam-0123", "/b/target/models"));
+        assert_eq!(folders("/"), Vec::<PathBuf>::new());
+    }
 }

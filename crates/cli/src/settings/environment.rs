@@ -9,8 +9,9 @@ use super::table::{PREFIX, active_variable, all_settings_command, environment_va
 use crate::log;
 use bokehcam::look::settings;
 
-/// Variables of this program that are not settings: the path of the settings file, and those of the tests.
-const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
+/// Variables of this program that are not settings: the path of the settings file, the folder of its networks, and those
+/// of the tests.
+const NOT_SETTINGS: [&str; 7] = ["CONFIG", "DATA", "MODELS", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
 
 /// Warns of variables with the prefix `BOKEHCAM_` that match no setting.
 pub fn warn_of_unknown() {

@@ -33,9 +33,11 @@ pub fn without(mut command: Command, begins: &[&str]) -> Command {
     command
 }
 
-/// Runs the command in the tester's session, but without their settings for the program, and with an empty stdin.
+/// Runs the command in the tester's session, but without their settings for the program, without the networks of the
+/// build's folder, and with an empty stdin.
 pub fn in_session(command: Command) -> Command {
     let mut command = without(command, &["BOKEHCAM_", "RUST_LOG", "NO_COLOR"]);
+    command.env("BOKEHCAM_MODELS", "/dev/null");
     command.stdin(Stdio::null());
     command
 }
