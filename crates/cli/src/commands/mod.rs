@@ -31,7 +31,7 @@ use crate::terminal::print_to_stdout;
 
 /// Depth-aware, disc-shaped background blur for cameras, recordings and stills
 #[derive(Parser, Debug)]
-#[command(name = "bokehcam", version, arg_required_else_help = true, max_term_width = 110)]
+#[command(name = "bokehcam", version, long_version = describe_build(), arg_required_else_help = true, max_term_width = 110)]
 #[command(after_help = "\
 Examples:
   bokehcam preview
@@ -47,6 +47,22 @@ pub struct Cli {
     pub global: options::Global,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// Returns the version, and on a second line the parts that were built in, which scripts/package reads.
+fn describe_build() -> String {
+    let parts = [
+        ("camera", cfg!(feature = "camera")),
+        ("desktop", cfg!(feature = "desktop")),
+        ("gpu", cfg!(feature = "gpu")),
+        ("lab", cfg!(feature = "lab")),
+        ("networks", cfg!(feature = "networks")),
+        ("pipewire", cfg!(feature = "pipewire")),
+        ("window", cfg!(feature = "window")),
+    ];
+    let built_in: Vec<&str> = parts.iter().filter(|(_, is_built_in)| *is_built_in).map(|(part, _)| *part).collect();
+    let built_in = if built_in.is_empty() { "no parts that can be left out".to_owned() } else { built_in.join(", ") };
+    format!("{}\nbuilt with {built_in}", env!("CARGO_PKG_VERSION"))
 }
 
 #[derive(Subcommand, Debug)]

@@ -47,8 +47,18 @@ fn every_command_has_help_with_examples() {
 
 #[test]
 fn the_version_is_the_packages() {
-    let version = run(&["--version"]);
-    assert_eq!(version.stdout, format!("bokehcam {}\n", env!("CARGO_PKG_VERSION")));
+    let version = format!("bokehcam {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(run(&["-V"]).stdout, version);
+    let long = run(&["--version"]).stdout;
+    let parts = long.strip_prefix(&*version).unwrap().strip_prefix("built with ").unwrap().trim_end();
+    let parts: Vec<&str> = parts.split(", ").collect();
+    // Every feature of the program is listed, if it is on.
+    let manifest = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    let features = manifest["features"].as_table().unwrap().keys().map(String::as_str);
+    let features: Vec<&str> = features.filter(|name| !["default", "packaged"].contains(name)).collect();
+    assert!(parts.iter().all(|part| features.contains(part)), "{parts:?} of {features:?}");
+    assert!(!cfg!(feature = "packaged") || features.iter().all(|name| *name == "lab" || parts.contains(name)));
 }
 
 #[test]
