@@ -13,7 +13,7 @@ use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Strength};
 use bokehcam::optics::{Lens, StereoRig};
 use bokehcam::source::options::DEPTH_SCALE;
-use bokehcam::source::{DepthOrigin, Options, PlateFile, SingleCameraDepth, Source};
+use bokehcam::source::{self, DepthOrigin, Options, PlateFile, SingleCameraDepth, Source};
 
 /// Tolerance below which grey values (0 to 1) count as equal.
 const TOLERANCE: f32 = 0.02;
@@ -29,6 +29,8 @@ const MIN_FAR_M: f32 = 1.0;
 /// plate.
 const MAX_FOREGROUND: f32 = 0.2;
 const MAX_RAGGEDNESS: f32 = 16.0;
+/// A person in a plate covers at least this share of it.
+const MIN_PERSON: f32 = 0.01;
 
 /// Warns of an implausibly wide baseline.
 pub fn warn_of_baseline(rig: Option<StereoRig>) {
@@ -195,6 +197,28 @@ pub fn warn_of_subject(chosen: Option<&SingleCameraDepth>, map: &DepthMap, image
         PlateFile::Taken => None,
     });
     check_subject(map, plate, image).iter().for_each(|line| log::warn(line));
+}
+
+/// Warns if the installed network finds a person in a plate, who would then not be found in front of it.
+pub fn warn_of_person_in_plate(plate: &ColorImage, file: &Path) {
+    let detector = SingleCameraDepth { mono: None, ..source::installed_networks() };
+    if !detector.has_networks() {
+        return;
+    }
+    let map = source::single_camera::compute_picture_depth(&detector, &Options::default(), &Look::default(), plate);
+    // A network that fails says nothing about the plate.
+    if map.is_ok_and(|map| near_share(&map) > MIN_PERSON) {
+        log::warn(&format!(
+            "{}: there is a person in the plate, whose place becomes background: take it while nobody is in the picture",
+            file.display()
+        ));
+    }
+}
+
+/// Returns the share of the picture that is as near as the subject; 0 without one.
+fn near_share(map: &DepthMap) -> f32 {
+    let near = |subject_m: f32| map.metres.iter().filter(|&&metres| metres <= subject_m).count();
+    map.subject_m.map_or(0.0, |subject_m| near(subject_m) as f32 / map.metres.len().max(1) as f32)
 }
 
 fn check_subject(map: &DepthMap, plate: Option<&Path>, image: Option<&Path>) -> Option<String> {
