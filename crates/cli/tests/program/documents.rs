@@ -271,6 +271,34 @@ fn the_examples_of_help_are_right() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Commands refuse to replace a file, so that a page that writes to the files of another one could not be followed after it.
+#[test]
+fn pages_that_are_followed_after_each_other_write_to_different_files() {
+    let mut written: Vec<(String, String)> = Vec::new();
+    let pages = fs::read_dir(Path::new(ROOT).join("docs")).unwrap().map(|page| page.unwrap().path());
+    for page in
+        pages.chain([Path::new(ROOT).join("README.md")]).filter(|page| page.extension().is_some_and(|is| is == "md"))
+    {
+        let name = page.file_name().unwrap().to_string_lossy().into_owned();
+        let skipped = |command: &String| {
+            let parts = LEFT_OUT.iter().chain(&ONLY_CHECKED).map(|(part, _)| *part);
+            parts.chain(["--force"]).any(|part| command.contains(part)) || !command.starts_with("bokehcam ")
+        };
+        for command in
+            pages::commands_in_blocks(&fs::read_to_string(&page).unwrap()).iter().filter(|command| !skipped(command))
+        {
+            let words: Vec<&str> = command.split(' ').filter(|word| !word.is_empty()).collect();
+            let outputs = words.windows(2).filter(|pair| ["--out", "--to", "--preview", "--report"].contains(&pair[0]));
+            for output in outputs.map(|pair| pair[1]).filter(|output| !["-", "null"].contains(output)) {
+                let earlier = written.iter().find(|(other, page)| other == output && *page != name);
+                assert_eq!(earlier, None, "{name} writes to {output}, too");
+                written.push((output.to_owned(), name.clone()));
+            }
+        }
+    }
+    assert!(written.len() > 30, "{written:?}");
+}
+
 #[test]
 fn the_readme_can_be_followed_line_by_line() {
     follow("README.md", 7);

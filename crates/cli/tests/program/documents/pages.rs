@@ -25,6 +25,15 @@ const OPEN: [(&str, &str); 18] = [
 
 /// Returns the commands of a page in order, without comments and with continuation lines joined.
 pub fn commands(page: &str) -> Vec<String> {
+    find_commands(page, within_sentences)
+}
+
+/// Returns the commands of a page's code blocks.
+pub fn commands_in_blocks(page: &str) -> Vec<String> {
+    find_commands(page, |_| Vec::new())
+}
+
+fn find_commands(page: &str, within_sentences: impl Fn(&str) -> Vec<String>) -> Vec<String> {
     let mut commands: Vec<String> = Vec::new();
     let (mut block, mut goes_on, mut sentences) = (None, false, String::new());
     for line in page.lines().map(str::trim_end).chain(["```"]) {
