@@ -12,13 +12,25 @@ const MIN_DIFFERENCE: f32 = 12.0;
 /// Minimum fraction of a picture that counts as a person.
 const MIN_PERSON: f32 = 0.004;
 
+/// Time without motion after which a person in the picture counts as at rest.
+const MIN_REST_NS: u64 = 1_000_000_000;
+
+/// Why a picture is no part of a plate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// Something moves.
+    Motion,
+    /// A person seems to be there, at rest. It may be an object that the network takes for one.
+    Person,
+}
+
 /// The result of adding a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CaptureResult {
     /// More pictures are needed; the progress, 0 to 1.
     Collecting(f32),
-    /// The picture shows motion or a person; the previous pictures were discarded.
-    Rejected,
+    /// The previous pictures were discarded.
+    Rejected(Obstacle),
     /// The finished plate.
     Finished(ColorImage),
 }
@@ -29,8 +41,11 @@ pub struct Capture {
     pictures: Vec<ColorImage>,
     last_ns: Option<u64>,
     reducer: Reducer,
+    /// The picture that later ones are compared with.
     first: Vec<[f32; 3]>,
     now: Vec<[f32; 3]>,
+    /// Time of the last motion.
+    moved_ns: Option<u64>,
 }
 
 impl Capture {
@@ -45,16 +60,17 @@ impl Capture {
             let count = persons.alpha.iter().filter(|alpha| **alpha > 0.5).count();
             count as f32 > MIN_PERSON * persons.alpha.len() as f32
         });
-        if are_there {
-            self.reset();
-            return CaptureResult::Rejected;
-        }
-        if self.first.len() == self.now.len() && differing_fraction(&self.first, &self.now) > MAX_MOVING {
-            self.reset();
-            return CaptureResult::Rejected;
-        }
-        if self.pictures.is_empty() {
+        let moves = self.first.len() == self.now.len() && differing_fraction(&self.first, &self.now) > MAX_MOVING;
+        if moves || self.first.len() != self.now.len() {
             self.first.clone_from(&self.now);
+        }
+        if moves {
+            self.moved_ns = Some(time_ns);
+        }
+        if moves || are_there {
+            self.discard();
+            let rests = !moves && self.moved_ns.is_none_or(|moved_ns| time_ns >= moved_ns + MIN_REST_NS);
+            return CaptureResult::Rejected(if rests { Obstacle::Person } else { Obstacle::Motion });
         }
         if self.last_ns.is_none_or(|last_ns| time_ns >= last_ns + MIN_INTERVAL_NS) {
             self.last_ns = Some(time_ns);
@@ -86,13 +102,13 @@ impl Capture {
             let middle = values.len() / 2;
             *code = *values.select_nth_unstable(middle).1;
         }
-        self.reset();
+        self.discard();
+        self.first.clear();
         plate
     }
 
-    fn reset(&mut self) {
+    fn discard(&mut self) {
         self.pictures.clear();
-        self.first.clear();
         self.last_ns = None;
     }
 }
@@ -124,11 +140,40 @@ mod tests {
         for step in 0..40 {
             match capture.add(&picture(step, step < 6), u64::from(step) * 100_000_000, None) {
                 CaptureResult::Collecting(progress) => assert!(progress < 1.0),
-                CaptureResult::Rejected => moved += 1,
+                CaptureResult::Rejected(why) => {
+                    assert_eq!(why, Obstacle::Motion);
+                    moved += 1;
+                }
                 CaptureResult::Finished(plate) => {
                     assert!(moved == 1 && step > 12, "{moved} {step}");
                     return assert!(plate.rgb.iter().all(|code| (101..=103).contains(code)));
                 }
+            }
+        }
+        panic!("no plate");
+    }
+
+    #[test]
+    fn who_rests_is_told_from_what_moves() {
+        let room = ColorImage::new(64, 48);
+        let mut passing = room.clone();
+        passing.rgb[3 * 64 * 20..3 * 64 * 30].fill(90);
+        let mut person = Mask::default();
+        person.resize(64, 48);
+        person.alpha[..300].fill(1.0);
+        let mut capture = Capture::default();
+        let mut add = |picture: &ColorImage, time_ms: u64, persons| capture.add(picture, time_ms * 1_000_000, persons);
+        let (moves, rests) = (CaptureResult::Rejected(Obstacle::Motion), CaptureResult::Rejected(Obstacle::Person));
+        assert_eq!(add(&room, 0, Some(&person)), rests, "a rucksack that a network takes for a person");
+        assert_eq!(add(&passing, 100, Some(&person)), moves);
+        assert_eq!(add(&passing, 200, Some(&person)), moves, "who stands still for a moment");
+        assert_eq!(add(&passing, 1200, Some(&person)), rests);
+        assert_eq!(add(&room, 1300, Some(&person)), moves);
+        // Whoever knows that it is nobody leaves the mask out.
+        for step in 0..Capture::PICTURES as u64 {
+            match add(&room, 1400 + 100 * step, None) {
+                CaptureResult::Finished(plate) => return assert!(plate == room),
+                other => assert!(matches!(other, CaptureResult::Collecting(_)), "{other:?}"),
             }
         }
         panic!("no plate");

@@ -9,7 +9,7 @@ mod learning;
 mod source;
 mod subject;
 
-pub use capture::{Capture, CaptureResult};
+pub use capture::{Capture, CaptureResult, Obstacle};
 pub use source::{CameraLock, Companion, Guide, PlateDepth, Step};
 
 use learning::{PlateUpdater, UpdateInput};

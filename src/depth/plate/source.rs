@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::{Capture, CaptureResult, Plate};
+use super::{Capture, CaptureResult, Obstacle, Plate};
 use crate::depth::matting::mask::MaskMatting;
 use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
@@ -40,6 +40,8 @@ pub enum Step {
     Moving,
     /// Something has moved for so long that no plate can be captured.
     KeepsMoving,
+    /// A person seems to be there, at rest: [`Guide::ignore_persons`] captures the plate anyway.
+    PersonThere,
     /// The plate is in use.
     Ready,
     /// The plate does not match the picture: the camera was moved or the light has changed.
@@ -56,6 +58,10 @@ impl fmt::Display for Step {
                 "something keeps moving, so no plate can be taken: put the camera on something firm, and leave the \
                  picture",
             ),
+            Self::PersonThere => f.write_str(
+                "somebody seems to be there: leave the picture; if nobody is, take a plate with `bokehcam plate`, and give \
+                 it with --depth plate:FILE.png",
+            ),
             Self::Ready => f.write_str("the plate is taken: come back"),
             Self::Mismatched => f.write_str(
                 "the picture no longer matches the plate, so everything is blurred: the camera was moved or the light \
@@ -71,6 +77,8 @@ pub struct Guide {
     /// Kind of the step times [`KINDS`], plus its number.
     step: AtomicU32,
     is_capture_requested: AtomicBool,
+    /// Whether what looks like a person does not prevent the capture.
+    are_persons_ignored: AtomicBool,
 }
 
 const KINDS: u32 = 1 << 16;
@@ -85,13 +93,20 @@ impl Guide {
             1 => Step::Capturing(number),
             2 => Step::Moving,
             3 => Step::KeepsMoving,
-            4 => Step::Ready,
+            4 => Step::PersonThere,
+            5 => Step::Ready,
             _ => Step::Mismatched,
         }
     }
 
+    /// Captures this plate although a person seems to be there.
+    pub fn ignore_persons(&self) {
+        self.are_persons_ignored.store(true, Ordering::Relaxed);
+    }
+
     /// Requests the capture of a new plate.
     pub fn request_capture(&self) {
+        self.are_persons_ignored.store(false, Ordering::Relaxed);
         self.is_capture_requested.store(true, Ordering::Relaxed);
     }
 
@@ -101,8 +116,9 @@ impl Guide {
             Step::Capturing(percent) => (1, percent),
             Step::Moving => (2, 0),
             Step::KeepsMoving => (3, 0),
-            Step::Ready => (4, 0),
-            Step::Mismatched => (5, 0),
+            Step::PersonThere => (4, 0),
+            Step::Ready => (5, 0),
+            Step::Mismatched => (6, 0),
         };
         self.step.store(kind * KINDS + number, Ordering::Relaxed);
     }
@@ -168,6 +184,7 @@ impl PlateDepth {
         }
         let persons = match self.state {
             State::CountingDown(_) => None,
+            State::Capturing { .. } if self.guide.are_persons_ignored.load(Ordering::Relaxed) => None,
             _ => self.companion.as_mut().and_then(|companion| companion.segment_persons(seen)),
         };
         match &mut self.state {
@@ -182,8 +199,9 @@ impl PlateDepth {
             }
             State::Capturing { capture, since_ns } => match capture.add(color, now_ns, persons) {
                 CaptureResult::Collecting(progress) => Step::Capturing((100.0 * progress) as u32),
-                CaptureResult::Rejected if now_ns > *since_ns + MAX_MOTION_NS => Step::KeepsMoving,
-                CaptureResult::Rejected => Step::Moving,
+                CaptureResult::Rejected(Obstacle::Person) => Step::PersonThere,
+                CaptureResult::Rejected(_) if now_ns > *since_ns + MAX_MOTION_NS => Step::KeepsMoving,
+                CaptureResult::Rejected(_) => Step::Moving,
                 CaptureResult::Finished(plate) => {
                     let mut plate = Box::new(Plate::new(plate));
                     plate.update(color, now_ns, persons);
@@ -238,5 +256,57 @@ impl DepthSource for PlateDepth {
 
     fn seek(&mut self, ahead_ns: i64) {
         self.companion.iter_mut().for_each(|companion| companion.seek(ahead_ns));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Stamp;
+
+    /// Takes something at rest in every picture for a person.
+    struct SeesSomebody(Mask);
+
+    impl DepthSource for SeesSomebody {
+        fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
+            map.resize(seen.color.width, seen.color.height);
+            Ok(())
+        }
+    }
+
+    impl Companion for SeesSomebody {
+        fn segment_persons(&mut self, _: FrameInput) -> Option<&Mask> {
+            Some(&self.0)
+        }
+        fn measure_background(&mut self, _: &ColorImage, _: &Mask, _: &mut DepthMap) {}
+    }
+
+    #[test]
+    fn what_looks_like_a_person_is_said_and_taken_only_by_who_knows_better() {
+        let mut mask = Mask::default();
+        mask.resize(64, 48);
+        mask.alpha[..600].fill(1.0);
+        let mut source = PlateDepth::new(None, None, Some(Box::new(SeesSomebody(mask))));
+        let (guide, room) = (source.guide(), ColorImage::new(64, 48));
+        let mut map = DepthMap::default();
+        let mut time_ns = 0;
+        let mut play = |seconds: u64, until: Step| {
+            for _ in 0..10 * seconds {
+                time_ns += 100_000_000;
+                let stamp = Stamp { index: 0, time_ns, captured_ns: None };
+                source.read(FrameInput { stamp, color: &room, right: None }, &mut map).unwrap();
+                if guide.step() == until {
+                    return true;
+                }
+            }
+            false
+        };
+        assert!(play(4, Step::PersonThere));
+        assert!(!play(20, Step::Ready) && guide.step() == Step::PersonThere, "however long it takes");
+        guide.ignore_persons();
+        assert!(play(3, Step::Ready));
+        // That was said about one plate.
+        guide.request_capture();
+        assert!(play(4, Step::PersonThere) && !play(5, Step::Ready));
     }
 }

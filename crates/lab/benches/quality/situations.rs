@@ -158,7 +158,7 @@ fn capture_plate(rendered: &RenderedSituation) -> ColorImage {
     (0..)
         .find_map(|frame| match capture.add_unchecked(&add_camera_noise(&rendered.room, rendered.noise, frame)) {
             CaptureResult::Finished(plate) => Some(plate),
-            CaptureResult::Collecting(_) | CaptureResult::Rejected => None,
+            CaptureResult::Collecting(_) | CaptureResult::Rejected(_) => None,
         })
         .unwrap_or_default()
 }
