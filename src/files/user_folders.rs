@@ -29,7 +29,7 @@ impl Folders {
     }
 
     /// Returns the user's folders of pictures and videos, from the environment, `user-dirs.dirs` or their default
-    /// names; the current folder if none exists.
+    /// names; if none exists the home folder, else the current one.
     pub fn from_user_dirs() -> Self {
         let home = absolute_env_path("HOME");
         let config = user_dir("XDG_CONFIG_HOME", ".config");
@@ -38,7 +38,8 @@ impl Folders {
         let folder = |variable: &str, usual: &str| {
             let home = home.as_deref();
             let named = named.as_deref().zip(home).and_then(|(text, home)| parse_user_dir(text, variable, home));
-            let all = [absolute_env_path(variable), named, home.map(|home| home.join(usual))];
+            let usual = home.map(|home| home.join(usual));
+            let all = [absolute_env_path(variable), named, usual, home.map(Path::to_owned)];
             all.into_iter()
                 .flatten()
                 .find(|folder| folder.is_dir())
