@@ -1,7 +1,7 @@
 //! PipeWire: cameras shared by the programs of a session, without a kernel module.
 //!
 //! A camera is a node of the class `Video/Source` with the role `Camera`; [`node`] creates one, [`graph`] lists them,
-//! and [`reader`] reads from one. PipeWire's objects belong to the thread that created them, so each node and each
+//! [`watch`] tells when they come and go, and [`reader`] reads from one. PipeWire's objects belong to the thread that created them, so each node and each
 //! reader has a thread of its own, which an eventfd (`wake`) wakes: no lock is taken on a frame's path.
 
 mod buffer;
@@ -14,6 +14,7 @@ mod param;
 pub mod reader;
 mod session;
 mod wake;
+pub mod watch;
 
 pub use error::PipeWireError;
 

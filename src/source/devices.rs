@@ -125,8 +125,49 @@ pub fn set_control(camera: &str, control: &str, value: i64) -> Result<Vec<Camera
     return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {control} cannot be {value}"));
 }
 
+/// Watches for cameras that come and go, without opening any.
+#[derive(Debug)]
+pub struct CameraWatch {
+    /// Device nodes at the last check.
+    nodes: Vec<String>,
+    /// Whether the last check found a change.
+    has_changed: bool,
+    #[cfg(feature = "pipewire")]
+    pipewire: Option<crate::pipewire::watch::SourceWatch>,
+}
+
+impl CameraWatch {
+    /// Starts to watch.
+    pub fn new() -> Self {
+        Self {
+            nodes: list_video_nodes(),
+            has_changed: false,
+            #[cfg(feature = "pipewire")]
+            pipewire: crate::pipewire::watch::SourceWatch::new()
+                .inspect_err(|error| tracing::debug!("cameras of PipeWire are not watched: {error}"))
+                .ok(),
+        }
+    }
+
+    /// Whether cameras came or went since the last check. A change is reported once more by the next check: a new device
+    /// node exists before its access rights are set.
+    pub fn has_changed(&mut self) -> bool {
+        let nodes = list_video_nodes();
+        let changed = std::mem::replace(&mut self.nodes, nodes) != self.nodes;
+        #[cfg(feature = "pipewire")]
+        let changed = self.pipewire.as_ref().is_some_and(|watch| watch.take_change()) || changed;
+        std::mem::replace(&mut self.has_changed, changed) || changed
+    }
+}
+
+impl Default for CameraWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// Returns the device nodes that may be cameras, from a listing of `/dev`.
-pub fn list_video_nodes() -> Vec<String> {
+fn list_video_nodes() -> Vec<String> {
     let entries = std::fs::read_dir("/dev").into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.retain(|name| name.starts_with("video"));

@@ -8,9 +8,14 @@ use rfd::FileDialog;
 use super::services::PathKind;
 use bokehcam::files::data;
 
-/// Error shown if the desktop has no file chooser.
+/// Errors shown if the desktop has no file chooser, for a source and for a background.
 const NO_DIALOG: &str = "This desktop has no file dialog (no portal, no zenity): drop a folder or a photo on the \
                          window, or start `bokehcam preview FOLDER`.";
+const NO_DIALOG_FOR_BACKGROUND: &str = "This desktop has no file dialog (no portal, no zenity): drop a picture or a video on the window and choose “Use as \
+     background”, or start with `--behind image:FILE` or `video:FILE`.";
+/// Endings of files that can be chosen.
+const PHOTOS: [&str; 6] = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
+const VIDEOS: [&str; 10] = ["mp4", "mkv", "webm", "mov", "gif", "MP4", "MKV", "WEBM", "MOV", "GIF"];
 /// A dialog that "cancels" within this time was never shown: no user is that fast.
 const MIN_DIALOG_TIME: Duration = Duration::from_millis(250);
 
@@ -19,21 +24,23 @@ const MIN_DIALOG_TIME: Duration = Duration::from_millis(250);
 /// # Errors
 /// Returns a one-line message with the alternatives if there is no dialog.
 pub fn choose_path(kind: PathKind) -> Result<Option<String>, String> {
+    let no_dialog = if kind == PathKind::Background { NO_DIALOG_FOR_BACKGROUND } else { NO_DIALOG };
     if !has_portal() && !has_zenity() {
-        return Err(NO_DIALOG.to_owned());
+        return Err(no_dialog.to_owned());
     }
     let opened_at = Instant::now();
     let picked = match kind {
         PathKind::Folder => FileDialog::new().set_title("Open a recording: its folder").pick_folder(),
-        PathKind::Photo | PathKind::Background => {
-            let title = if kind == PathKind::Photo { "Open a photo" } else { "A picture behind the subject" };
-            let photos = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
-            FileDialog::new().set_title(title).add_filter("Photos", &photos).pick_file()
+        PathKind::Photo => FileDialog::new().set_title("Open a photo").add_filter("Photos", &PHOTOS).pick_file(),
+        PathKind::Background => {
+            let files = [&PHOTOS[..], &VIDEOS].concat();
+            let dialog = FileDialog::new().set_title("A picture or a video behind the subject");
+            dialog.add_filter("Pictures and videos", &files).pick_file()
         }
     };
     match picked {
         Some(path) => path_to_name(&path).map(Some),
-        None if opened_at.elapsed() < MIN_DIALOG_TIME => Err(NO_DIALOG.to_owned()),
+        None if opened_at.elapsed() < MIN_DIALOG_TIME => Err(no_dialog.to_owned()),
         None => Ok(None),
     }
 }

@@ -57,8 +57,9 @@ fn is_handled_by_controls(chord: Chord) -> bool {
 /// Whether a key may trigger this action now: nothing may change unseen beneath the help or the closing dialog.
 fn is_allowed(action: &Action, state: &State) -> bool {
     match action {
-        Action::Close | Action::CancelClose => true,
-        Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
+        Action::CancelClose => true,
+        // A second press, out of nervousness, does not answer the question whether to close.
+        Action::Close | Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
         _ => !state.help && !state.closing,
     }
 }

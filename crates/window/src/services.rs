@@ -17,7 +17,7 @@ pub enum PathKind {
     Folder,
     /// The file of a photo.
     Photo,
-    /// The file of a background picture.
+    /// The file of a background, a picture or a video.
     Background,
 }
 
@@ -71,6 +71,11 @@ pub trait Services: Send {
     /// Whether devices appeared or disappeared since the last call.
     fn have_devices_changed(&mut self) -> bool {
         false
+    }
+
+    /// Returns a camera that has come while the source is the demonstration for want of one.
+    fn awaited_camera(&mut self) -> Option<String> {
+        None
     }
 
     /// Checks that `name` is a valid source.

@@ -1,7 +1,11 @@
 //! [`Services`] of the operating system: real cameras, files and GPUs.
 
+mod cameras;
+
 use std::collections::BTreeMap;
 use std::str::FromStr;
+
+use cameras::{first_camera, is_there, list_cameras};
 
 use super::dialog;
 use super::services::{CliOption, FileChooser, OpenedSource, PathKind, Services, SettingsStore};
@@ -14,7 +18,7 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::sink::{self, Sink, Target};
-use bokehcam::source::devices::{self, Choice};
+use bokehcam::source::devices::{self, CameraWatch, Choice};
 use bokehcam::source::{self, DepthChoice, Kind, Options, SingleCameraDepth, Size, Source, SourceName, modes};
 
 /// Shown if there is no camera, and the demonstration replaces it.
@@ -44,8 +48,9 @@ pub struct System {
     opened: Vec<Choice>,
     /// Camera name with the frame size and rate chosen for it.
     chosen_mode: Option<(String, Size, f64)>,
-    /// Device nodes at the last check, and whether that check found a change.
-    device_nodes: (Vec<String>, bool),
+    devices: CameraWatch,
+    /// Whether the source is the demonstration for want of a camera.
+    is_fallback: bool,
     /// Values of the driver controls set by the user, by name.
     control_values: BTreeMap<String, i64>,
     /// Device of the camera opened last, if it has driver controls.
@@ -68,7 +73,8 @@ impl System {
             settings,
             opened: Vec::new(),
             chosen_mode: None,
-            device_nodes: (devices::list_video_nodes(), false),
+            devices: CameraWatch::new(),
+            is_fallback: false,
             control_values: BTreeMap::new(),
             camera: None,
             depth_method: None,
@@ -83,13 +89,14 @@ impl System {
         let Some(camera) = &self.camera else {
             // A camera known only to PipeWire is a laptop's built-in one.
             let faces_user = is_lone && name.kind() == Kind::Camera;
-            return Camera { is_relative, faces_user, ..Camera::default() };
+            return Camera { is_relative, faces_user, is_fallback: self.is_fallback, ..Camera::default() };
         };
         let is_pair = self.options.stereo.side_by_side;
         Camera {
             modes: modes::list_modes(camera),
             faces_user: is_lone && !is_pair && modes::faces_user(camera),
             is_relative,
+            is_fallback: false,
         }
     }
 
@@ -188,10 +195,11 @@ impl System {
 
 impl Services for System {
     fn list_sources(&mut self) -> Vec<Choice> {
-        let mut sources = devices::list_cameras();
-        sources.extend(devices::list_pipewire_cameras());
-        let is_other =
-            |choice: &&Choice| choice.name != demo::NAME && !sources.iter().any(|camera| camera.name == choice.name);
+        let mut sources = list_cameras();
+        let is_other = |choice: &&Choice| {
+            let name = choice.name.as_str();
+            name != demo::NAME && !sources.iter().any(|camera| camera.name == name) && is_there(name, &sources)
+        };
         let opened: Vec<Choice> = self.opened.iter().filter(is_other).cloned().collect();
         sources.extend(opened);
         sources.push(Choice { name: demo::NAME.into(), label: "Demonstration".into() });
@@ -220,17 +228,12 @@ impl Services for System {
 
     fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String> {
         let mut notes = Vec::new();
-        let first_camera = || devices::list_cameras().into_iter().chain(devices::list_pipewire_cameras()).next();
-        let name = match name {
-            "" => first_camera().map_or_else(
-                || {
-                    notes.push(NO_CAMERA.to_owned());
-                    demo::NAME.to_owned()
-                },
-                |camera| camera.name,
-            ),
-            name => name.to_owned(),
-        };
+        let found = if name.is_empty() { first_camera() } else { Some(name.to_owned()) };
+        self.is_fallback = found.is_none();
+        let name = found.unwrap_or_else(|| {
+            notes.push(NO_CAMERA.to_owned());
+            demo::NAME.to_owned()
+        });
         let (source, source_name) = self.open_source(&name, depth_method)?;
         // Automatically used networks are not announced, because the user sees their effect.
         let is_asked = matches!(self.options.depth_choice, DepthChoice::SingleCamera(_)) || depth_method.is_some();
@@ -266,11 +269,11 @@ impl Services for System {
     }
 
     fn have_devices_changed(&mut self) -> bool {
-        let nodes = devices::list_video_nodes();
-        let differ = nodes != self.device_nodes.0;
-        // Reports the change once more at the next check: a new node exists before its access rights are set.
-        let again = std::mem::replace(&mut self.device_nodes, (nodes, differ)).1;
-        differ || again
+        self.devices.has_changed()
+    }
+
+    fn awaited_camera(&mut self) -> Option<String> {
+        if self.is_fallback { first_camera() } else { None }
     }
 
     fn check_source_name(&self, name: &str) -> Result<(), String> {

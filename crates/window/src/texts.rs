@@ -44,6 +44,11 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
     text
 }
 
+/// Formats a number with this many decimal places, and the language's decimal sign.
+pub fn format_number(number: impl Into<f64>, digits: usize) -> String {
+    format!("{:.digits$}", number.into()).replace('.', tr("."))
+}
+
 /// Translates a complete sentence, matching table entries with the placeholders `{}` or `{name}` and inserting the
 /// values into the translation. Names and error reasons are not in the table and stay unchanged.
 pub fn translate_sentence(sentence: &str) -> String {
@@ -193,6 +198,9 @@ pub mod tests {
         assert_eq!([tr("Mirror"), tr("Depth"), tr("Focus")], ["Spiegel", "Depth", "Focus"]);
         assert_eq!(tr_with("{} of {}", &[&2, &"3"]), "von 2 3");
         assert_eq!(tr_with("{} m", &[]), " m");
+        assert_eq!((format_number(1.25f32, 1), format_number(-0.5, 2)), ("1.2".to_owned(), "-0.50".to_owned()));
+        set_translation([(".".to_owned(), ",".to_owned())].into());
+        assert_eq!((format_number(1.25f32, 1), format_number(40.0, 0)), ("1,2".to_owned(), "40".to_owned()));
     }
 
     #[test]

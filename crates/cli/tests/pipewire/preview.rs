@@ -28,7 +28,7 @@ fn plain_recording(folder: &Path, name: &str, (width, height): (u32, u32), rgb: 
 }
 
 #[test]
-#[ignore = "needs PipeWire (tests/pipewire/session)"]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
 fn a_reader_gets_the_pictures_of_thirty_sources_one_after_the_other() {
     folder();
     let place = tempfile::tempdir().unwrap();

@@ -3,10 +3,11 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use bokehcam::source::devices::{CameraWatch, list_pipewire_cameras};
 use serde_json::Value;
 
 use super::program::{Beside, Ran, bokehcam};
-use super::session::{Run, folder, node, until};
+use super::session::{Player, Run, folder, kill, node, until};
 
 /// A camera provided by GStreamer.
 struct Camera {
@@ -74,6 +75,34 @@ fn middle(path: &std::path::Path) -> [u8; 3] {
 fn is_near(got: [u8; 3], rgb: u32) -> bool {
     let wanted = [rgb >> 16, rgb >> 8, rgb].map(|code| code as u8);
     got.iter().zip(wanted).all(|(got, wanted)| got.abs_diff(wanted) <= 4)
+}
+
+#[test]
+#[ignore = "needs PipeWire (crates/cli/tests/pipewire/session)"]
+fn a_camera_that_comes_or_goes_is_noticed_and_the_list_is_right_then() {
+    folder();
+    let mut watch = CameraWatch::new();
+    let mut until_listed = |what: &str, is_listed: bool| {
+        until(what, || {
+            let listed = || list_pipewire_cameras().iter().any(|camera| camera.name == "pipewire:desk-left");
+            (watch.has_changed() && listed() == is_listed).then_some(())
+        });
+        // A change is reported at two checks.
+        std::thread::sleep(Duration::from_secs(1));
+        watch.has_changed();
+        watch.has_changed();
+        assert!(!watch.has_changed(), "{what}: nothing else changed");
+    };
+    let player = Player::start("desk-left", &["--to", "pipewire:Desk, left"]);
+    until_listed("it came", true);
+    player.end();
+    until_listed("it went", false);
+    let player = Player::start("desk-left", &["--to", "pipewire:Desk, left"]);
+    until_listed("it came again", true);
+    kill("pipewire");
+    until_listed("it is there after the daemon's return", true);
+    player.end();
+    until_listed("it went for good", false);
 }
 
 #[test]

@@ -61,6 +61,8 @@ fn close_topmost(state: &State) -> Option<Action> {
         Some(Action::SelfTimer(false))
     } else if state.help {
         Some(Action::Help(false))
+    } else if state.asked_file().is_some() {
+        Some(Action::DismissDropped)
     } else if state.output_failure.is_some() {
         Some(Action::DismissFailure)
     } else if let Some(depth_method) = state.method_without_plate() {

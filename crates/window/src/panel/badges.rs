@@ -10,7 +10,7 @@ use super::icons;
 use super::marks::draw_label;
 use super::state::State;
 use super::theme::{GAP, OVERLAY_COLOR};
-use crate::texts::tr;
+use crate::texts::{format_number, tr};
 
 /// Red that is bright enough for a dot on a dark badge.
 const ACTIVE_COLOR: Color32 = Color32::from_rgb(255, 90, 80);
@@ -79,9 +79,9 @@ fn freeze_text(state: &State) -> Option<&'static str> {
 fn format_size(bytes: u64) -> String {
     let (kb, mb) = (bytes as f64 / 1e3, bytes as f64 / 1e6);
     if mb >= 1e3 {
-        format!("{:.2} GB", mb / 1e3)
+        format!("{} GB", format_number(mb / 1e3, 2))
     } else if mb >= 1.0 {
-        format!("{mb:.1} MB")
+        format!("{} MB", format_number(mb, 1))
     } else {
         format!("{kb:.0} kB")
     }

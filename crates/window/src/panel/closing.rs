@@ -11,7 +11,7 @@ use crate::texts::tr;
 /// Warns that closing stops the virtual camera.
 const CALL_WARNING: &str = "A call that uses this camera gets no more pictures.";
 
-/// Draws the modal dialog, with the initial focus on the safe choice. The key bindings handle Esc and the closing keys.
+/// Draws the modal dialog, with the initial focus on the safe choice. The key bindings handle Esc.
 pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let checkbox_id = Id::unique("closing never asks");
     if !state.closing {
@@ -40,7 +40,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
             if stay.clicked() {
                 actions.push(Action::CancelClose);
             }
-            if add_button(ui, if is_recording { "Stop and close" } else { "Close" }, "Q again") {
+            if add_button(ui, if is_recording { "Stop and close" } else { "Close" }, "") {
                 // "Do not ask again" takes effect only on closing, not on cancelling.
                 actions.extend([Action::AskBeforeClosing(!never_ask), Action::Close]);
             }

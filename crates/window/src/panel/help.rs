@@ -23,6 +23,9 @@ const GESTURES: [(&str, &str); 9] = [
 
 /// Scroll distance of an arrow key, in points.
 const LINE: f32 = 40.0;
+/// Width of the keys, and of the gap beside them, in points.
+const KEYS_WIDTH: f32 = 104.0;
+const SPACING: f32 = 12.0;
 
 /// Draws the help as a modal, in two columns if the window is wide. Enter or a click outside closes it; the arrow and
 /// page keys scroll it.
@@ -98,10 +101,15 @@ fn add_table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &
     ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);
     ui.label(RichText::new(tr(name)).family(medium_font()).color(colors.accent));
-    Grid::new(name).num_columns(2).spacing(vec2(12.0, 4.0)).min_col_width(104.0).show(ui, |ui| {
+    let width = (ui.available_width() - KEYS_WIDTH - 2.0 * SPACING).max(40.0);
+    Grid::new(name).num_columns(2).spacing(vec2(SPACING, 4.0)).min_col_width(KEYS_WIDTH).show(ui, |ui| {
         for (keys, does) in rows {
             ui.label(RichText::new(tr(keys)).family(medium_font()));
-            ui.add(Label::new(RichText::new(tr(does)).color(colors.weak)).wrap());
+            // A grid gives each cell as much width as it asks for, over its neighbour if need be.
+            ui.scope(|ui| {
+                ui.set_max_width(width);
+                ui.add(Label::new(RichText::new(tr(does)).color(colors.weak)).wrap());
+            });
             ui.end_row();
         }
     });

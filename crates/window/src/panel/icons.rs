@@ -50,7 +50,7 @@ pub fn add_button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     if enabled && response.hovered() {
         ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);
     }
-    let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.45) };
+    let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.65) };
     draw(ui.painter(), icon, rect.center(), color);
     response.tooltip(hint).clicked()
 }

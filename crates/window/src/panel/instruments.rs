@@ -11,7 +11,7 @@ use super::cards;
 use super::meters::{GRAPH_FRAMES, Summary};
 use super::state::{Source, State};
 use super::theme::{Colors, GAP, PAD, medium_font, quality_color};
-use crate::texts::{tr, tr_with};
+use crate::texts::{format_number, tr, tr_with};
 use bokehcam::budget::Quality;
 
 const WIDTH: f32 = 286.0;
@@ -53,7 +53,7 @@ impl Instruments {
         };
         let Summary { fps, latency_ms: [p50, p99], reaction_ms } = self.summary;
         ui.horizontal(|ui| {
-            ui.label(RichText::new(format!("{fps:.1}")).family(medium_font()).size(22.0));
+            ui.label(RichText::new(format_number(fps, 1)).family(medium_font()).size(22.0));
             ui.label(RichText::new("fps").color(colors.weak));
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 let last = state.meters.samples().last().and_then(|bar| bar.quality);
@@ -96,7 +96,7 @@ fn active_theme(ui: &Ui) -> Theme {
 }
 
 fn format_ms(ms: f64) -> String {
-    format!("{ms:.1} ms")
+    format!("{} ms", format_number(ms, 1))
 }
 
 /// Adds a name and a right-aligned value, which wraps if needed.

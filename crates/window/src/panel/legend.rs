@@ -5,7 +5,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stro
 use super::state::State;
 use super::theme::{Colors, GAP, PAD, card_frame};
 use super::views::{BIN_COLORS, Legend, depth_fraction, diverging_color, viridis};
-use crate::texts::{tr, tr_with};
+use crate::texts::{format_number, tr, tr_with};
 
 const WIDTH: f32 = 260.0;
 /// Height of a colour bar, in points.
@@ -115,7 +115,7 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
     let font = FontId::new(11.0, super::theme::medium_font());
     painter.text(swatch.center(), Align2::CENTER_CENTER, index + 1, font, ink);
     let low_px = index.checked_sub(1).map(|before| high_px[before]);
-    let number = |px: f32| if px < 0.0 { format!("−{:.1}", -px) } else { format!("{px:.1}") };
+    let number = |px: f32| if px < 0.0 { format!("−{}", format_number(-px, 1)) } else { format_number(px, 1) };
     let range = match (low_px, high_px[index].is_finite()) {
         (None, false) => tr("all").to_owned(),
         (None, true) => tr_with("to {} px", &[&number(high_px[index])]),
@@ -143,5 +143,5 @@ pub fn round_tick_depths(near_m: f32, far_m: f32) -> Vec<f32> {
 }
 
 fn format_metres(metres: f32) -> String {
-    if metres < 10.0 && metres.fract() > 0.01 { format!("{metres:.1}") } else { format!("{metres:.0}") }
+    format_number(metres, usize::from(metres < 10.0 && metres.fract() > 0.01))
 }

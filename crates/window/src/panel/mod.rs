@@ -186,7 +186,8 @@ impl Panel {
         // else.
         let is_used = self.was_in_use || self.sheet.has_open_dialog() && !state.help && !state.closing;
         let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && is_used;
-        let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
+        // A list that a click opened has no focus, and still takes the arrow keys.
+        let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped || egui::Popup::is_any_open(ctx);
         let context = keys::Context { size, fit: viewport::fit_scale(ctx, size), chord: 0 };
         ui.input(|input| {
             actions

@@ -16,13 +16,14 @@ const SHOWN_S: f64 = 3.5;
 const PER_CHARACTER_S: f64 = 0.05;
 /// Fade-out at the end of that time, in seconds.
 const FADE_S: f64 = 0.4;
-/// Maximum number of notes shown at once.
+/// Maximum number of notes shown at once; above a card only the last one is.
 const MAX_SHOWN: usize = 3;
-/// Title and text for the demonstration source.
-const DEMONSTRATION: [&str; 2] = [
-    "This is a demonstration",
-    "No camera is in use. Choose one under “Camera”; if there is none, `bokehcam doctor` says why.",
-];
+/// Title for the demonstration source, and texts: it was chosen, or is shown for want of a camera.
+const DEMONSTRATION: &str = "This is a demonstration";
+const DEMONSTRATION_CHOSEN: &str =
+    "No camera is in use. Choose one in the list “Camera”; if there is none, `bokehcam doctor` says why.";
+const DEMONSTRATION_AS_FALLBACK: &str =
+    "No camera was found. One that you connect is used at once; `bokehcam doctor` says why there is none.";
 
 /// First display times of the notes.
 #[derive(Default)]
@@ -45,8 +46,10 @@ impl NoteTimes {
         plate::show(&mut stack, state, actions);
         if state.is_demonstration() && !state.controls_hidden && !state.demonstration_dismissed {
             let buttons = [("OK", "Esc", Action::DismissDemonstration)];
-            stack.add_buttons("demonstration", 460.0, DEMONSTRATION, buttons, actions);
+            let why = if state.camera.is_fallback { DEMONSTRATION_AS_FALLBACK } else { DEMONSTRATION_CHOSEN };
+            stack.add_buttons("demonstration", 460.0, [DEMONSTRATION, why], buttons, actions);
         }
+        add_drop_question(&mut stack, state, actions);
         add_banner(&mut stack, state, actions);
         if let Some(why) = &state.output_failure {
             let [title, why] = failure_texts(why);
@@ -78,10 +81,24 @@ impl NoteTimes {
         if next_s.is_finite() {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
-        for (&(text, opacity), place) in shown.iter().rev().take(MAX_SHOWN).zip(0..) {
+        let max_shown = if stack.bottom > bottom + GAP { 1 } else { MAX_SHOWN };
+        for (&(text, opacity), place) in shown.iter().rev().take(max_shown).zip(0..) {
             stack.add_text(Id::unique(("note", place)), 460.0, opacity, text);
         }
     }
+}
+
+/// Asks what a dropped file is for, if opening it would replace a camera or what others see.
+fn add_drop_question(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
+    let Some(name) = state.asked_file() else { return };
+    let title = tr_with("What is {} for?", &[&name.trim_end_matches('/').rsplit('/').next().unwrap_or(name)]);
+    let why = "Opening it replaces the picture that is shown now, also in calls.";
+    let background = ("Use as background", "It replaces what is behind you", Action::UseDroppedAsBackground);
+    let buttons = state.asked_background().map(|_| background).into_iter().chain([
+        ("Open instead", "What is shown now is closed", Action::OpenDropped),
+        ("Cancel", "Esc", Action::DismissDropped),
+    ]);
+    stack.add_buttons("dropped", 460.0, [&title, why], buttons, actions);
 }
 
 /// Returns the title and text for an output failure.
@@ -97,11 +114,11 @@ fn add_banner(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
     let silent;
     let (title, why, button) = match (&state.source, state.silent_s) {
         (Source::Running(_), None) => return,
-        (Source::Running(running), Some(silent_s)) => {
+        (Source::Running(_), Some(silent_s)) => {
             silent = tr_with(
                 "{}: no frames for {} s. It continues by itself once frames \
                          arrive.",
-                &[&running.label, &silent_s],
+                &[&state.title(), &silent_s],
             );
             ("No picture", silent.as_str(), Some("Try again"))
         }

@@ -4,7 +4,7 @@ use egui::{ProgressBar, RichText};
 
 use super::cards::{CardStack, add_paragraph};
 use super::dock::picture_area;
-use super::state::{Action, State};
+use super::state::{Action, DepthMethod, State};
 use super::theme::medium_font;
 use super::widgets::add_button;
 use crate::texts::tr;
@@ -22,9 +22,15 @@ pub fn show_offer(stack: &mut CardStack, state: &State, actions: &mut Vec<Action
         ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::CapturePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());
     let buttons = [network].into_iter().chain(plate).chain([("Not now", "Esc", Action::DeclineDepthOffer)]);
-    // Omits the explanation if it would cover a small picture.
-    let is_small = picture_area(stack.ctx).height() < 360.0;
-    let why = if is_small { "" } else { "Nothing is known about depth here, so everything is blurred." };
+    let why = match state.depth_methods().contains(&DepthMethod::Person) {
+        // Omits the explanation if it would cover a small picture.
+        _ if picture_area(stack.ctx).height() < 360.0 => "",
+        true => "Nothing is known about depth here, so everything is blurred.",
+        false => {
+            "Nothing is known about depth here, so everything is blurred. The network is not installed yet: run `bokehcam \
+             models get` in a terminal, then press the button."
+        }
+    };
     stack.add_buttons("plate offer", WIDTH, ["A portrait from this picture alone", why], buttons, actions);
 }
 
@@ -37,6 +43,9 @@ pub fn show(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
         Step::Moving => ("Something moves", "Stay out of the picture, and do not move the camera."),
         Step::KeepsMoving => {
             ("No plate so far", "Something keeps moving: put the camera on something firm, and step out.")
+        }
+        Step::PersonThere => {
+            ("Somebody seems to be there", "Step out of the picture. If nobody is there, take it anyway.")
         }
         // `Step::Mismatched`: the plate does not match the picture.
         _ => (
@@ -59,6 +68,10 @@ pub fn show(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
         add_paragraph(ui, colors, why);
         if step == Step::Mismatched && add_button(ui, "Take another plate", "T") {
             actions.push(Action::CapturePlate);
+        }
+        let hint = "What stands there becomes part of the room";
+        if step == Step::PersonThere && add_button(ui, "Take it anyway", hint) {
+            actions.push(Action::CapturePlateAnyway);
         }
         if let Some(depth_method) = state.method_without_plate().filter(|_| add_button(ui, "Find me without it", "Esc"))
         {

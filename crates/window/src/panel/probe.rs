@@ -5,7 +5,7 @@ use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 use super::marks::draw_label;
 use super::state::{State, ViewMode};
 use super::viewport::Viewport;
-use crate::texts::{tr, tr_with};
+use crate::texts::{format_number, tr, tr_with};
 use crate::views::Probe;
 use bokehcam::frame::DepthMap;
 
@@ -41,9 +41,9 @@ fn format_probe(probe: Probe, is_relative: bool) -> String {
     let depth = match (probe.depth_m, is_relative) {
         (None, _) => tr("no depth").to_owned(),
         (Some(far), true) if far >= 0.99 * DepthMap::FAR_M => tr("far").to_owned(),
-        (Some(near), true) => tr_with("{} × the nearest", &[&format!("{near:.2}")]),
+        (Some(near), true) => tr_with("{} × the nearest", &[&format_number(near, 2)]),
         (Some(metres), false) if metres >= 100.0 => format!("{metres:.0} m"),
-        (Some(metres), false) => format!("{metres:.2} m"),
+        (Some(metres), false) => format!("{} m", format_number(metres, 2)),
     };
     tr_with("{}, CoC {} px", &[&depth, &format!("{:+.1}", probe.coc_px)]).replace('-', "−")
 }

@@ -8,8 +8,8 @@ use super::icons::{self, Icon};
 use super::sections::{self, PanelForm, PresetEditor, Thumbnails, first};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD};
-use super::widgets::truncate_start;
-use crate::texts::{tr, tr_with};
+use super::widgets::truncate_end;
+use crate::texts::{format_number, tr, tr_with};
 
 /// State of the panel between frames.
 #[derive(Default)]
@@ -120,13 +120,13 @@ const STATUS_PERIOD_S: f32 = 0.5;
 fn add_status(ui: &mut Ui, state: &State) {
     let colors = Colors::for_ui(ui);
     let mut parts: Vec<String> = Vec::new();
-    if let Source::Running(running) = &state.source {
+    if matches!(state.source, Source::Running(_)) {
         // Shortened, to leave room for the focus distance.
-        parts.push(truncate_start(&running.label, 34));
+        parts.push(truncate_end(state.title(), 34));
     }
-    let focused = state.look.effect.follows_depth() && !state.source_depth().is_relative;
+    let focused = state.look.effect.follows_depth() && !state.camera.is_relative;
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
-        parts.push(tr_with("focused at {} m", &[&format!("{metres:.2}")]));
+        parts.push(tr_with("focused at {} m", &[&format_number(metres, 2)]));
     }
     let text = match &state.source {
         Source::Running(_) => parts.join(", "),

@@ -8,7 +8,7 @@ use egui::{
 };
 
 use super::theme::{Colors, ROW, medium_font};
-use crate::texts::{tr, tr_with};
+use crate::texts::{format_number, tr, tr_with};
 
 /// Width of a number beside its label, in points.
 const NUMBER_WIDTH: f32 = 70.0;
@@ -94,6 +94,7 @@ pub fn add_number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
                     .update_while_editing(false)
                     .max_decimals(digits)
                     .min_decimals(digits)
+                    .custom_formatter(|number, _| format_number(number, digits))
                     .prefix(before)
                     .suffix(after);
                 // Accepts a decimal comma, as in 1,5.
@@ -143,7 +144,8 @@ fn report_range(ctx: &Context, spec: &Number, number: f64) {
     let (min, max) = (f64::from(*range.start()), f64::from(*range.end()));
     if number < min - half || number > max + half {
         let taken = if number < min { min } else { max };
-        let [min, max, taken] = [min, max, taken].map(|number| format!("{before}{number:.digits$}{after}"));
+        let [min, max, taken] =
+            [min, max, taken].map(|number| format!("{before}{}{after}", format_number(number, digits)));
         let line = tr_with("{} is limited to {} to {}: {} was set.", &[&tr(label), &min, &max, &taken]);
         ctx.data_mut(|data| data.insert_temp(message_id(), line));
     }
@@ -248,13 +250,18 @@ pub fn add_dropdown<'a, T: PartialEq>(
     let menu = ComboBox::from_id_salt(what).selected_text(shown).truncate().show_ui(ui, |ui| {
         for (name, hint, option) in options {
             let is_chosen = option == *chosen;
-            if ui.selectable_label(is_chosen, name).tooltip(hint).clicked() && !is_chosen {
-                picked = Some(option);
+            if ui.selectable_label(is_chosen, name).tooltip(hint).clicked() {
+                // egui closes the list by itself only after a click of the pointer.
+                ui.close();
+                picked = Some(option).filter(|_| !is_chosen);
             }
         }
     });
+    // Linux's screen readers get no value of a list, so its name has it.
+    let what = tr(what);
+    let name = if shown.starts_with(what) { shown.to_owned() } else { format!("{what}: {shown}") };
     menu.response.widget_info(|| {
-        let mut info = WidgetInfo::labeled(Role::ComboBox, menu.response.enabled(), tr(what));
+        let mut info = WidgetInfo::labeled(Role::ComboBox, menu.response.enabled(), &name);
         info.current_text_value = Some(shown.to_owned());
         info
     });
@@ -312,6 +319,14 @@ pub fn truncate_start(text: &str, max_chars: usize) -> String {
     }
 }
 
+/// Returns the first `max_chars` characters of a text, the last of them replaced by an ellipsis if it is longer.
+pub fn truncate_end(text: &str, max_chars: usize) -> String {
+    match text.chars().count() > max_chars {
+        true => text.chars().take(max_chars.saturating_sub(1)).chain(['…']).collect(),
+        false => text.to_owned(),
+    }
+}
+
 /// Adds a foldable section. Returns whether its title was clicked.
 pub fn add_foldable_section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
     let colors = Colors::for_ui(ui);
@@ -322,5 +337,7 @@ pub fn add_foldable_section(ui: &mut Ui, name: &str, open: bool, body: impl FnOn
         ui.add_space(2.0);
         body(ui);
     });
+    // Linux's screen readers are not told what is expanded, but what is pressed.
+    ui.ctx().accesskit_node_builder(folded.header_response.id, |node| node.set_toggled(open.into()));
     folded.header_response.clicked()
 }

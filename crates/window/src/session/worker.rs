@@ -169,6 +169,7 @@ impl SessionWorker {
             }
             Request::Offer(name) => self.check_offer(name),
             Request::Browse(what) => self.open_file_chooser(what),
+            Request::LoadBackground(file) => self.load_background(file),
             Request::Mode(size, fps) => self.set_camera_mode(size, fps),
             // The window handles all others, or they have their own command.
             _ => {}

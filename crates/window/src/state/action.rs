@@ -83,7 +83,15 @@ pub enum Action {
     /// Switches to this virtual camera, or to none.
     VirtualCamera(Option<String>),
     Open(String),
-    /// Opens a file chooser for a source or a background picture.
+    /// A file or folder was dropped on the window.
+    Drop(String),
+    /// Opens the dropped file that was asked about.
+    OpenDropped,
+    /// Puts the dropped file behind the subject.
+    UseDroppedAsBackground,
+    /// Forgets the dropped file.
+    DismissDropped,
+    /// Opens a file chooser for a source or a background.
     Browse(PathKind),
     /// Switches the camera's frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
@@ -93,6 +101,8 @@ pub enum Action {
     Control(String, i64),
     /// Captures a background plate: the user is told when to step out of the picture.
     CapturePlate,
+    /// Captures it although a person seems to be there.
+    CapturePlateAnyway,
     /// Gets depth from person segmentation.
     SegmentPerson,
     /// Declines the offered depth methods.
@@ -136,11 +146,15 @@ pub enum Request {
     /// Opens this source if it is valid.
     Offer(String),
     Browse(PathKind),
+    /// Reads this picture or video as the background.
+    LoadBackground(String),
     /// Reopens the camera with this frame size (width, height) and rate (fps).
     Mode((u32, u32), f64),
     Control(String, i64),
     /// Captures a background plate, and uses it for depth.
     CapturePlate,
+    /// Captures it although a person seems to be there.
+    CapturePlateAnyway,
     /// Switches the depth method.
     SetDepthMethod(DepthMethod),
     /// Seeks to this frame of the recording.
@@ -172,6 +186,8 @@ pub enum Update {
     Camera(Camera),
     /// An offered source is valid, and is to be opened.
     Offered(String),
+    /// A camera came while the demonstration is shown for want of one.
+    CameraFound(String),
     /// The user chose another background.
     Background(Background),
     /// Active outputs: sent after each start or stop, including failed ones.

@@ -84,7 +84,15 @@ impl State {
             Action::OpenFolder => return self.saved_in.clone().map(Request::OpenFolder).into_iter().collect(),
             Action::Record(on) => return self.set_recording(on),
             Action::VirtualCamera(name) => return self.set_virtual_camera(name),
-            Action::Open(name) => return self.open_source(name),
+            Action::Open(name) => return self.choose_source(name),
+            Action::Drop(name) => return self.drop_file(name),
+            Action::OpenDropped => {
+                return self.take_dropped().map_or_else(Vec::new, |name| self.choose_source(name));
+            }
+            Action::UseDroppedAsBackground => {
+                return self.take_dropped().map(Request::LoadBackground).into_iter().collect();
+            }
+            Action::DismissDropped => self.dropped = None,
             Action::Browse(what) => return vec![Request::Browse(what)],
             Action::Mode(size, fps) => return self.set_camera_mode(size, fps),
             Action::Retry => return self.open_source(self.source_name.clone()),
@@ -94,6 +102,7 @@ impl State {
                 return vec![Request::CapturePlate];
             }
             Action::CapturePlate => self.note(NO_PLATE),
+            Action::CapturePlateAnyway => return vec![Request::CapturePlateAnyway],
             Action::DeclineDepthOffer => self.depth_offer_declined = true,
             Action::SegmentPerson => return vec![Request::SetDepthMethod(DepthMethod::Person)],
             Action::SetDepthMethod(depth_method) => return vec![Request::SetDepthMethod(depth_method)],
@@ -120,6 +129,9 @@ impl State {
     fn set_frozen(&mut self, on: bool) {
         if on && !self.frozen && !self.outputs.is_empty() {
             self.note(OUTPUTS_CONTINUE);
+        }
+        if !on {
+            self.withdraw_note(OUTPUTS_CONTINUE);
         }
         self.frozen = on;
     }
@@ -167,7 +179,9 @@ impl State {
                 self.shown = ViewMode::Picture;
             }
         }
-        if look.effect == Effect::None && matches!(self.shown, ViewMode::Coc | ViewMode::Bins) {
+        if look.effect != Effect::None {
+            self.withdraw_note(NOT_BLURRED);
+        } else if matches!(self.shown, ViewMode::Coc | ViewMode::Bins) {
             self.shown = ViewMode::Picture;
         }
         self.look = look;
@@ -254,6 +268,7 @@ impl State {
             self.source_name.clone_from(&name);
         }
         self.source = Source::Opening;
+        self.dropped = None;
         (self.frozen, self.shows_final_photo, self.transport) = (false, false, None);
         self.focus_m = None;
         vec![Request::Open(name)]

@@ -12,6 +12,8 @@ pub struct Camera {
     pub faces_user: bool,
     /// Whether depth is relative, without metres; applies to any kind of source.
     pub is_relative: bool,
+    /// Whether it is the demonstration, shown for want of a camera.
+    pub is_fallback: bool,
 }
 
 impl State {

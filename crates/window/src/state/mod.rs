@@ -9,7 +9,9 @@ mod apply;
 mod camera;
 mod cli_options;
 mod depth_method;
+mod dropped;
 mod history;
+mod notes;
 mod preferences;
 #[cfg(test)]
 pub mod sample;
@@ -26,13 +28,14 @@ pub use action::{Action, Request, Update};
 pub use apply::NO_VIRTUAL_CAMERA;
 pub use camera::Camera;
 pub use depth_method::DepthMethod;
+pub use dropped::DroppedFile;
 pub use history::History;
+pub use notes::Note;
 pub use preferences::{Preferences, TEXT_SCALE_RANGE};
 pub use transport::Transport;
 pub use zoom::Zoom;
 
 use super::meters::Meters;
-use super::texts::translate_sentence;
 pub use super::views::ViewMode;
 use super::views::{Legend, Probe};
 use bokehcam::camera_control::CameraControl;
@@ -93,14 +96,6 @@ pub struct Output {
     pub is_camera: bool,
 }
 
-/// A message to the user, shown for a while.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Note {
-    /// Unique number, counting from 1.
-    pub number: u64,
-    pub text: String,
-}
-
 /// Everything that the window shows except the picture itself.
 #[derive(Clone, Debug, Default)]
 pub struct State {
@@ -110,6 +105,11 @@ pub struct State {
     pub first_look: Look,
     /// The source's name on the command line.
     pub source_name: String,
+    /// The source that the user chose in the window, for the next start. What the command line names and what is shown
+    /// for want of a camera is no choice.
+    pub chosen_source: Option<String>,
+    /// The file dropped last, until it is opened.
+    pub dropped: Option<DroppedFile>,
     pub source: Source,
     /// The available sources.
     pub sources: Vec<Choice>,
@@ -195,25 +195,11 @@ pub struct State {
 
 /// Shown once the background plate is captured.
 const PLATE_CAPTURED: &str = "Come back: the room behind you is known now. Keep the camera where it is.";
-/// Maximum number of notes that are kept.
-const MAX_NOTES: usize = 6;
 
 impl State {
     /// Creates the state of a window that opens `source_name` with `look`, with the panel open.
     pub fn new(look: Look, source_name: String) -> Self {
         Self { first_look: look.clone(), look, source_name, panel: true, ..Self::default() }
-    }
-
-    /// Adds a message, translated into the display language.
-    pub fn note(&mut self, text: impl Into<String>) {
-        let text = translate_sentence(&text.into());
-        // A repeated message replaces the earlier one and is shown anew.
-        self.notes.retain(|note| note.text != text);
-        self.last_note_number += 1;
-        self.notes.push(Note { number: self.last_note_number, text });
-        if self.notes.len() > MAX_NOTES {
-            self.notes.remove(0);
-        }
     }
 
     /// Updates the progress of the background plate. Returns whether it changed.
@@ -297,9 +283,10 @@ impl State {
         self.frozen || self.shows_final_photo || matches!(self.source, Source::Lost(_) | Source::Ended)
     }
 
-    /// Whether the pipeline can pause: the window keeps its picture, and the source can stand still.
+    /// Whether the pipeline can pause once the displayed picture is held: the window needs no other.
     pub fn can_pause_pipeline(&self) -> bool {
-        (self.frozen || self.shows_final_photo) && matches!(&self.source, Source::Running(running) if !running.is_live)
+        let is_plate_due = self.plate.is_some_and(|step| step != Step::Ready);
+        (self.frozen || self.shows_final_photo) && !is_plate_due && matches!(self.source, Source::Running(_))
     }
 
     /// Whether frames have depth; assumed true while no source is running.

@@ -216,20 +216,6 @@ fn controls_of_the_camera_stay_in_their_range() {
 }
 
 #[test]
-fn notes_are_few_and_numbered_and_none_is_there_twice() {
-    let mut state = state();
-    for k in 0..20 {
-        state.apply_update(Update::Note(format!("note {k}")));
-    }
-    let numbers: Vec<u64> = state.notes.iter().map(|note| note.number).collect();
-    assert_eq!(numbers, [15, 16, 17, 18, 19, 20]);
-    assert_eq!(state.notes.last().unwrap().text, "note 19");
-    // A repeated message is shown once.
-    ["a", "b", "a"].iter().for_each(|line| state.note(*line));
-    assert_eq!(state.notes[4..].iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
-}
-
-#[test]
 fn what_went_wrong_stays_until_it_is_known() {
     let mut state = state();
     state.apply_update(Update::OutputFailure("the disk is full".into()));

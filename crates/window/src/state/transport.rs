@@ -36,3 +36,24 @@ impl State {
         requests
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::state::Action;
+    use crate::state::sample::state;
+    use bokehcam::depth::plate::Step;
+
+    #[test]
+    fn a_frozen_picture_needs_no_other() {
+        let mut state = state();
+        assert!(!state.can_pause_pipeline());
+        state.apply(Action::Freeze(true));
+        assert!(state.can_pause_pipeline(), "of a camera as well");
+        state.plate = Some(Step::StepOut(2));
+        assert!(!state.can_pause_pipeline(), "a plate is being taken");
+        state.plate = Some(Step::Ready);
+        assert!(state.can_pause_pipeline());
+        state.apply(Action::Freeze(false));
+        assert!(!state.can_pause_pipeline());
+    }
+}

@@ -21,11 +21,11 @@ pub(super) struct Gfx {
 
 /// Application id by which desktops group windows.
 const APP_ID: &str = "bokehcam";
-const DEFAULT_SIZE: LogicalSize<f64> = LogicalSize::new(1280.0, 720.0);
+const DEFAULT_SIZE: WindowSize = WindowSize { width: 1280.0, height: 720.0, maximized: false };
 const MIN_SIZE: LogicalSize<f64> = LogicalSize::new(240.0, 160.0);
 
 impl Gfx {
-    /// Opens the window with the saved size.
+    /// Opens the window with the saved size, limited to the screen.
     ///
     /// # Errors
     /// Fails if the display refuses the window, or no presenter can draw to it.
@@ -37,12 +37,16 @@ impl Gfx {
         device: Option<Arc<Device>>,
     ) -> Result<Self, WindowError> {
         use winit::platform::{wayland::WindowAttributesExtWayland, x11::WindowAttributesExtX11};
-        let inner = size.map_or(DEFAULT_SIZE, |size| LogicalSize::new(size.width, size.height));
+        // Wayland names no primary screen, and its compositor limits the window itself.
+        let screen = events.primary_monitor().or_else(|| events.available_monitors().next());
+        let screen = screen.map(|screen| screen.size().to_logical::<f64>(screen.scale_factor()));
+        let size = size.unwrap_or(DEFAULT_SIZE);
+        let size = screen.map_or(size, |screen| size.limited_to((screen.width, screen.height)));
         let attributes = Window::default_attributes()
             .with_title(APP_ID)
-            .with_inner_size(inner)
+            .with_inner_size(LogicalSize::new(size.width, size.height))
             .with_min_inner_size(MIN_SIZE)
-            .with_maximized(size.is_some_and(|size| size.maximized))
+            .with_maximized(size.maximized)
             .with_fullscreen(full_screen.then_some(Fullscreen::Borderless(None)));
         // X11 and Wayland set the application id separately.
         let attributes = WindowAttributesExtX11::with_name(attributes, APP_ID, APP_ID);

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::state::Preferences;
 use bokehcam::files::{atomic_file, input};
 use bokehcam::look::{Look, LookError, Patch};
-use bokehcam::source::{Kind, SourceName};
+use bokehcam::source::{Kind, SourceName, devices};
 
 /// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,17 @@ pub struct WindowSize {
 const MIN_SIDE: f64 = 200.0;
 const MAX_SIDE: f64 = 16_384.0;
 
+/// Height of a title bar and of the desktop's own bars, in logical pixels.
+const BARS_HEIGHT: f64 = 48.0;
+
+impl WindowSize {
+    /// Returns the size limited to a screen of this width and height in logical pixels, with its title bar.
+    pub fn limited_to(self, (width, height): (f64, f64)) -> Self {
+        let limit = |side: f64, screen: f64| side.min(screen.max(MIN_SIDE));
+        Self { width: limit(self.width, width), height: limit(self.height, height - BARS_HEIGHT), ..self }
+    }
+}
+
 impl SavedState {
     /// Reads the file; `None` if it is missing or invalid, without an error, because users do not edit it.
     pub fn read(path: &Path) -> Option<Self> {
@@ -55,8 +66,12 @@ impl SavedState {
     /// Returns the source, if its devices still exist; a stream on standard input is gone.
     pub fn restore_source(&self) -> Option<String> {
         let is_there = |name: &&String| {
-            SourceName::from_str(name)
-                .is_ok_and(|name| name.kind() != Kind::Stdin && name.device_nodes().iter().all(|node| node.exists()))
+            SourceName::from_str(name).is_ok_and(|parsed| {
+                let is_listed = || devices::list_pipewire_cameras().iter().any(|camera| camera.name == **name);
+                parsed.kind() != Kind::Stdin
+                    && parsed.device_nodes().iter().all(|node| node.exists())
+                    && (parsed.pipewire_name().is_none() || is_listed())
+            })
         };
         self.source.as_ref().filter(is_there).cloned()
     }
@@ -108,6 +123,20 @@ fn absolute_name(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_is_no_larger_than_the_screen() {
+        let stored = WindowSize { width: 3836.0, height: 2120.0, maximized: false };
+        let on = |screen| {
+            let WindowSize { width, height, .. } = stored.limited_to(screen);
+            (width, height)
+        };
+        assert_eq!(on((3840.0, 2160.0)), (3836.0, 2112.0), "with its title bar");
+        assert_eq!(on((1920.0, 1080.0)), (1920.0, 1032.0), "the same screen at scale 2");
+        assert_eq!(on((0.0, 0.0)), (MIN_SIDE, MIN_SIDE), "a screen of unknown size");
+        let small = WindowSize { width: 640.0, height: 480.0, maximized: true };
+        assert_eq!(small.limited_to((1280.0, 800.0)), small);
+    }
 
     #[test]
     fn what_is_written_is_read_and_nonsense_is_nothing() {

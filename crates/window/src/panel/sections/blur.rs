@@ -7,7 +7,7 @@ use crate::panel::widgets::{Number, add_choice, add_remark};
 use crate::state::tweak::{
     DEFAULT_LENS, F_NUMBER_RANGE, coc_fraction, f_number_for_coc, lens_coc_fraction, lens_for_look,
 };
-use crate::texts::tr_with;
+use crate::texts::{format_number, tr_with};
 use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
 use bokehcam::optics::Lens;
 
@@ -56,7 +56,7 @@ fn equivalent_lens(form: &PanelForm) -> String {
     let (f_number, focal_mm) =
         (f_number_for_coc(fraction, form.state.focus_distance_m(), form.size), DEFAULT_LENS.focal_length_mm);
     if f_number.is_finite() && f_number < 64.0 {
-        tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format!("{f_number:.1}")])
+        tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format_number(f_number, 1)])
     } else {
         "No visible blur".to_owned()
     }

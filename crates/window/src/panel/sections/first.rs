@@ -51,7 +51,8 @@ fn add_source_list(ui: &mut Ui, form: &mut PanelForm) {
         title => title,
     };
     let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
-    if let Some(name) = add_dropdown(ui, "Camera", shown, sources, &&state.source_name[..]) {
+    let shown = tr_with("Camera: {}", &[&shown]);
+    if let Some(name) = add_dropdown(ui, "Camera", &shown, sources, &&state.source_name[..]) {
         form.push_action(Action::Open(name.to_owned()));
     }
 }

@@ -5,7 +5,7 @@ use egui::Ui;
 use super::PanelForm;
 use crate::panel::widgets::{Number, add_remark};
 use crate::state::tweak::{FOCUS_DISTANCE_RANGE_M, FOCUS_RANGE_LIMITS_M};
-use crate::texts::tr_with;
+use crate::texts::{format_number, tr_with};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::DepthMap;
 
@@ -51,7 +51,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
         form.add_number(ui, &how, form.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
         let half_m = form.look.focus_range_m / 2.0;
         if half_m > 0.0 {
-            let [from, to] = [(metres - half_m).max(0.0), metres + half_m].map(|metres| format!("{metres:.2}"));
+            let [from, to] = [(metres - half_m).max(0.0), metres + half_m].map(|metres| format_number(metres, 2));
             add_remark(ui, &tr_with("Sharp from {} m to {} m", &[&from, &to]));
         }
     }

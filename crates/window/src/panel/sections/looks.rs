@@ -13,6 +13,9 @@ use crate::texts::{tr, tr_with};
 use bokehcam::look::Effect;
 use bokehcam::look::presets::Preset;
 
+/// The built-in presets as they are shown.
+const READY_MADE: [&str; 5] = ["Portrait", "Cinematic", "Dreamy", "Product", "Miniature"];
+
 /// State of the preset dialog.
 #[derive(Debug, Default, PartialEq)]
 enum Dialog {
@@ -183,7 +186,8 @@ fn add_name_field(
 fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
     let colors = Colors::for_ui(ui);
     // Names of user presets are displayed verbatim.
-    let shown = if preset.is_user_defined { preset.name.clone() } else { capitalize(&preset.name) };
+    let built_in = READY_MADE.iter().find(|name| !preset.is_user_defined && name.eq_ignore_ascii_case(&preset.name));
+    let shown = built_in.map_or(preset.name.as_str(), |name| tr(name)).to_owned();
     let text = colors.text_on_fill(chosen, possible);
     let number_color = if possible && !chosen { colors.weak } else { text };
     let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium_font()), text);
@@ -207,9 +211,4 @@ fn draw_chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible:
         (true, true) => "your own look",
         (true, false) => "a ready-made look",
     })
-}
-
-fn capitalize(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

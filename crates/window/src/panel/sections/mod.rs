@@ -6,6 +6,7 @@ mod blur;
 mod effect;
 pub mod first;
 mod focus;
+mod framing;
 mod looks;
 mod output;
 mod quality;
@@ -93,9 +94,9 @@ impl PanelForm<'_> {
         self.state.may_have_depth()
     }
 
-    /// Whether depth is relative, without metres.
+    /// Whether depth is relative, without metres; while a source opens, as it was before.
     fn is_relative(&self) -> bool {
-        self.state.source_depth().is_relative
+        self.state.camera.is_relative
     }
 
     fn follows_depth(&self) -> bool {
@@ -123,7 +124,13 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor, thumb
     }
     add_section(ui, form, "Source", true, source::show);
     add_section(ui, form, "Record and call", true, output::show);
-    add_section(ui, form, "View", true, view::show);
+    add_section(ui, form, "View", true, |ui, form| {
+        // It follows the subject by depth.
+        if form.follows_depth() {
+            framing::show(ui, form);
+        }
+        view::show(ui, form);
+    });
     if !form.state.controls.is_empty() {
         add_section(ui, form, "Controls of the camera", false, source::add_controls);
     }

@@ -67,9 +67,11 @@ fn every_control_has_a_name() {
             counted += 1;
         }
         tree.find(Role::TextInput, "Name of the preset");
-        let quality = tree.find(Role::ComboBox, "Quality");
+        let quality = tree.find(Role::ComboBox, "Quality: Auto: as the time allows");
         assert_eq!(quality.value(), Some("Auto: as the time allows"));
-        tree.find(Role::ComboBox, "Auto exposure");
+        for list in ["Camera: Recording: portrait", "Auto exposure: Aperture Priority Mode", "Camera for calls: Off"] {
+            tree.find(Role::ComboBox, list);
+        }
         assert!(counted > 40, "only {counted}");
     }
 }
@@ -88,6 +90,9 @@ fn values_and_states_are_told() {
     assert_eq!(tree.find(Role::RadioButton, "Heart").toggled(), Some(Toggled::False));
     assert!(tree.find(Role::Button, "Redo (Ctrl+Shift+Z)").is_disabled(), "nothing to redo");
     assert!(!tree.find(Role::Button, "Record").is_disabled());
-    assert_eq!(tree.find(Role::DisclosureTriangle, "Focus").is_expanded(), Some(true));
+    let (open, folded) =
+        (tree.find(Role::DisclosureTriangle, "Focus"), tree.find(Role::DisclosureTriangle, "Background"));
+    assert_eq!((open.is_expanded(), open.toggled()), (Some(true), Some(Toggled::True)));
+    assert_eq!((folded.is_expanded(), folded.toggled()), (Some(false), Some(Toggled::False)));
     assert!(tree.0.iter().any(|(_, node)| node.role() == Role::Window && node.label() == Some("bokehcam")), "a name");
 }

@@ -23,11 +23,16 @@ fn closing_asks_once_while_something_is_recorded() {
     window.press(Key::Q, Modifiers::NONE);
     window.wait(0.2);
     assert!(window.place_of("Stop recording and close?").is_some());
-    // It captures keys and clicks.
+    // It captures keys and clicks, and a nervous second press is no answer.
     let look = window.state.look.clone();
-    for key in [Key::M, Key::Num2, Key::OpenBracket, Key::V] {
-        window.press(key, Modifiers::NONE);
+    for key in [Key::M, Key::Num2, Key::OpenBracket, Key::V, Key::Q] {
+        assert_eq!(window.press(key, Modifiers::NONE), [], "{key:?}");
     }
+    let ctrl = Modifiers::CTRL | Modifiers::COMMAND;
+    for key in [Key::Q, Key::W] {
+        assert_eq!(window.press(key, ctrl), [], "Ctrl+{key:?}");
+    }
+    assert!(window.state.closing);
     window.click(pos2(200.0, 650.0));
     assert_eq!((&window.state.look, window.state.mirror, window.state.outputs.len()), (&look, false, 1));
     window.state.closing = true;

@@ -7,6 +7,7 @@ use egui::{Event, Key, Modifiers, pos2};
 use super::{Action, Window, on_panel, pressed};
 use crate::keys::GROUPS;
 use crate::state::{Output, Source, Transport};
+use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::Strength;
 use bokehcam::optics::Lens;
@@ -139,6 +140,27 @@ fn arrows_choose_among_options_as_in_any_group() {
     window.tab_to("Cinematic");
     assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("dreamy".into())]);
     assert_eq!(window.press(Key::ArrowRight, Modifiers::NONE), [Action::Preset("product".into())]);
+}
+
+#[test]
+fn arrows_in_a_list_that_a_click_opened_belong_to_the_list() {
+    let mut window = Window::new();
+    let list = window.places().into_iter().find(|(text, _)| text.starts_with("Background: ")).unwrap().1;
+    window.click(list);
+    window.wait(0.2);
+    assert!(egui::Popup::is_any_open(&window.ctx));
+    for _ in 0..2 {
+        window.press(Key::ArrowDown, Modifiers::NONE);
+        window.wait(0.1);
+    }
+    assert_eq!(window.state.look.focus, FocusRule::Auto, "the point of focus stays");
+    window.press(Key::Enter, Modifiers::NONE);
+    window.wait(0.2);
+    assert!(!matches!(window.state.look.background, Background::Blur) && window.state.look.focus == FocusRule::Auto);
+    assert!(!egui::Popup::is_any_open(&window.ctx), "it is closed by its choice");
+    window.ctx.memory_mut(|memory| memory.stop_text_input());
+    window.press(Key::ArrowDown, Modifiers::NONE);
+    assert!(matches!(window.state.look.focus, FocusRule::Point { .. }), "then they are the picture's again");
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
         window.wait(0.2);
         done
     };
-    assert_eq!(choose(&mut window, "Picture"), [Action::Browse(PathKind::Background)]);
+    assert_eq!(choose(&mut window, "Picture or video"), [Action::Browse(PathKind::Background)]);
     assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
     choose(&mut window, "Colour");
     assert!(matches!(window.state.look.background, Background::Color(_)));
@@ -63,9 +63,21 @@ fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
     assert!(matches!(request, Some(Request::Look(look)) if look.background == wall));
     window.wait(0.1);
     assert!(window.place_of("wall.jpg").is_some());
-    assert_eq!(window.click_on("Choose picture…"), [Action::Browse(PathKind::Background)]);
+    assert_eq!(window.click_on("Choose file…"), [Action::Browse(PathKind::Background)]);
     window.state.apply(Action::Undo);
     assert!(matches!(window.state.look.background, Background::Color(_)), "as every other change");
+}
+
+#[test]
+fn auto_framing_is_with_the_view() {
+    let mut window = Window::of(sample::state(), (1280, 2000));
+    window.state.apply(Action::Section("Background", true));
+    window.wait(0.5);
+    let [background, view, follow] =
+        ["Background", "View", "Follow the subject"].map(|text| window.place_of(text).expect(text).y);
+    assert!(background < view && view < follow);
+    window.click_on("Follow the subject");
+    assert!(window.state.look.follow.zoom().is_some());
 }
 
 #[test]

@@ -97,13 +97,18 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
 
 #[test]
 fn a_long_name_leaves_room_for_the_distance_of_focus() {
-    let mut state = sample::state();
-    let Source::Running(running) = &mut state.source else { unreachable!() };
-    running.label = "/home/somebody/recordings/of a day/in the garden".into();
-    let mut window = Window::of(state, (1280, 720));
-    window.wait(0.3);
-    let is_whole = |text: &String| text.starts_with('…') && text.ends_with("in the garden, focused at 1.24 m");
-    assert!(window.texts().iter().any(is_whole), "{:?}", window.texts());
+    for (label, shown) in [
+        ("/home/somebody/recordings/of a day/in the garden", "in the garden, focused at 1.24 m"),
+        ("Integrated Webcam, 640x480 YUYV at 30 fps", "Integrated Webcam, focused at 1.24 m"),
+        ("A very long name of a camera on the desk", "A very long name of a camera on t…, focused at 1.24 m"),
+    ] {
+        let mut state = sample::state();
+        let Source::Running(running) = &mut state.source else { unreachable!() };
+        (running.label, state.source_name) = (label.into(), "not listed".into());
+        let mut window = Window::of(state, (1280, 720));
+        window.wait(0.3);
+        assert!(window.texts().iter().any(|text| text == shown), "{shown}: {:?}", window.texts());
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Window, sample};
 use crate::keys::GROUPS;
-use crate::state::{Action, DepthMethod, Output, Source, State, Transport, tweak};
+use crate::state::{Action, DepthMethod, DroppedFile, Output, Source, State, Transport, tweak};
 use crate::texts::{self, tests as table};
 use crate::views::Legend;
 use bokehcam::depth::backdrop::Background;
@@ -13,7 +13,7 @@ use bokehcam::look::{Effect, FramingZoom, Strength};
 
 /// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 18] = [
+    let changes: [&dyn Fn(&mut State); 22] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -66,6 +66,16 @@ fn windows() -> Vec<Window> {
             state.legend = Some(Legend::Coc { max_px: 9.0 });
         },
         &|state| (state.source, state.plate) = (sample::running(false), Some(Step::StepOut(3))),
+        &|state| (state.source, state.plate) = (sample::running(false), Some(Step::PersonThere)),
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            (running.has_depth, running.depth_methods) = (false, vec![DepthMethod::Person]);
+        },
+        &|state| state.dropped = Some(DroppedFile { name: "wall.png".into(), is_asked: true }),
+        &|state| {
+            let Source::Running(running) = &mut state.source else { return };
+            (running.name, state.camera.is_fallback) = ("demo".into(), true);
+        },
         &|state| {
             state.source = Source::Lost("gone".into());
             state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::views::MAX_BINS] });
@@ -150,6 +160,7 @@ fn all_that_is_drawn_is_translated() {
         "Desk camera",
         "portrait",
         "clip.mp4",
+        "wall.png",
         "bokehcam",
         "kept",
         "cpu, 2",

@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use super::SessionWorker;
 use crate::services::PathKind;
-use crate::session::Command;
+use crate::session::{Command, EventSender};
 use crate::state::{Request, Update};
 use bokehcam::files::atomic_file;
 use bokehcam::look::BackgroundSetting;
+use bokehcam::source::video::is_video;
 
 /// Interval of checks for new devices, for readers of virtual cameras, and of the recording's size.
 const CHECK_PERIOD: Duration = Duration::from_secs(1);
@@ -50,9 +51,17 @@ impl SessionWorker {
             return;
         }
         self.report_choices();
-        let is_there = self.config.services.list_sources().iter().any(|choice| choice.name == self.config.source);
-        if self.pipeline.is_none() && is_there && self.config.source.starts_with("/dev/") {
-            self.open_source();
+        let source = &self.config.source;
+        let is_camera = source.starts_with("/dev/") || source.starts_with("pipewire:");
+        let is_there = self.config.services.list_sources().iter().any(|choice| choice.name == *source);
+        if self.pipeline.is_none() && is_there && is_camera {
+            return self.open_source();
+        }
+        // A recording would end with its source.
+        if self.config.outputs.iter().all(|output| output.is_camera)
+            && let Some(camera) = self.config.services.awaited_camera()
+        {
+            self.events.send_update(Update::CameraFound(camera));
         }
     }
 
@@ -69,10 +78,7 @@ impl SessionWorker {
         let (commands, events) = (self.commands.clone(), self.events.clone());
         let choose_path = self.config.services.create_file_chooser(what);
         let spawned = std::thread::Builder::new().name("dialog".into()).spawn(move || match choose_path() {
-            Ok(Some(file)) if what == PathKind::Background => match BackgroundSetting::Image(file.into()).load() {
-                Ok(behind) => events.send_update(Update::Background(behind)),
-                Err(error) => events.note(error.to_string()),
-            },
+            Ok(Some(file)) if what == PathKind::Background => load_background(file, &events),
             Ok(Some(name)) => drop(commands.send(Command::Request(Request::Offer(name)))),
             Ok(None) => {}
             Err(line) => events.note(line),
@@ -82,10 +88,30 @@ impl SessionWorker {
         }
     }
 
+    /// Reads a picture or video as the background, on its own thread.
+    pub(super) fn load_background(&self, file: String) {
+        let events = self.events.clone();
+        let spawned =
+            std::thread::Builder::new().name("background".into()).spawn(move || load_background(file, &events));
+        if let Err(error) = spawned {
+            self.events.note(format!("the background is not read: {error}"));
+        }
+    }
+
     /// Reopens the camera with another frame size and rate.
     pub(super) fn set_camera_mode(&mut self, size: (u32, u32), fps: f64) {
         self.config.services.set_mode(&self.config.source, size, fps);
         self.stop_run();
         self.open_source();
+    }
+}
+
+/// Reads a picture or video, and reports it as the new background.
+fn load_background(file: String, events: &EventSender) {
+    let file = std::path::PathBuf::from(file);
+    let setting = if is_video(&file) { BackgroundSetting::Video(file) } else { BackgroundSetting::Image(file) };
+    match setting.load() {
+        Ok(behind) => events.send_update(Update::Background(behind)),
+        Err(error) => events.note(error.to_string()),
     }
 }

@@ -81,11 +81,12 @@ impl App {
         }
     }
 
-    /// Pauses the source while the window is hidden or stands still, unless an output is active.
+    /// Pauses the source while the window is hidden or its picture stands still, unless an output is active.
     pub(super) fn update_watch(&mut self) {
+        let is_held = self.held_number.is_some() && self.view.as_ref().is_some_and(may_stay) && !self.snapshot_due;
         self.hidden_at = if self.is_hidden() { self.hidden_at.or_else(|| Some(Instant::now())) } else { None };
         let is_watched = self.hidden_at.is_none_or(|at| at.elapsed() < PAUSE_DELAY);
-        match (&self.watch, is_watched && !self.state.can_pause_pipeline()) {
+        match (&self.watch, is_watched && !(is_held && self.state.can_pause_pipeline())) {
             (None, true) => {
                 self.watch = Some(self.demand.watch());
                 self.last_frame_at = Instant::now();
@@ -95,6 +96,11 @@ impl App {
             (None, false) | (Some(_), true) => {}
         }
     }
+}
+
+/// Whether a frame can stay on the screen: it is in memory, to be saved, and has its own depth.
+pub(super) fn may_stay(view: &View) -> bool {
+    view.picture.memory().is_some() && !view.trace.is_depth_reused
 }
 
 /// Copies a frame to memory as still number `number`; `None` if it is only on a device.

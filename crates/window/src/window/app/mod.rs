@@ -260,7 +260,7 @@ impl ApplicationHandler<UserEvent> for App {
                 self.perform_action(Action::Close, events);
                 return self.on_input();
             }
-            WindowEvent::DroppedFile(path) => return self.on_file_dropped(path),
+            WindowEvent::DroppedFile(path) => return self.on_file_dropped(path, events),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
                 // Time while the window is invisible does not count as latency.
@@ -308,7 +308,7 @@ impl ApplicationHandler<UserEvent> for App {
         let Some(path) = &self.saved_state_file else { return };
         self.saved_state.size = self.gfx.as_ref().and_then(Gfx::size_to_save).or(self.saved_state.size);
         self.saved_state.preferences = self.state.preferences.clone();
-        self.saved_state.set_source(&self.state.source_name);
+        self.state.chosen_source.iter().for_each(|name| self.saved_state.set_source(name));
         self.saved_state.set_look(&self.look_to_save());
         self.saved_state.write(path);
     }

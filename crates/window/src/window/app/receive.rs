@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
 use super::App;
+use super::held_frame::may_stay;
 use super::seek::SeekState;
 use crate::session::SessionEvent;
 use crate::state::Source;
 use bokehcam::link::Receiver;
-use bokehcam::pipeline::View;
 
 /// Update interval of the playback position.
 const POSITION_PERIOD: Duration = Duration::from_millis(250);
@@ -69,7 +69,6 @@ impl App {
         }
         // A frozen frame must be in memory, to be saved, and have its own depth: frames are replaced until both hold.
         let stays = self.state.frozen || self.state.shows_final_photo;
-        let may_stay = |view: &View| view.picture.memory().is_some() && !view.trace.is_depth_reused;
         let stays = stays && self.view.as_ref().is_some_and(may_stay);
         if let Some(view) = newest.filter(|view| !stays || self.seek_state.is_requested_frame(view)) {
             self.update_position(&view);

@@ -93,6 +93,7 @@ impl App {
                 }
                 Request::Seek(frame) => self.seek_to_frame(frame),
                 Request::Off(off) => self.set_off(off),
+                Request::CapturePlateAnyway => self.guide.iter().for_each(|guide| guide.ignore_persons()),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
                     // Before the look, so that it is not applied to a photo's picture without depth.

@@ -187,6 +187,42 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
 }
 
 #[test]
+fn the_demonstration_gives_way_to_a_camera_that_it_stands_in_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = |told: &Update| *told == Update::CameraFound(CAMERA.into());
+    let listed = |told: &Update| match told {
+        Update::Choices { sources, .. } => sources.iter().any(|choice| choice.name == CAMERA),
+        _ => false,
+    };
+    let mut watched = Watched::begin("", folder.path());
+    watched.until("the demonstration", is_running);
+    watched.services.store(true, Ordering::SeqCst);
+    watched.until("the camera", found);
+    watched.session.send(Request::Open(CAMERA.into()));
+    watched.until("it runs", is_running);
+    watched.frame("its picture", |view| view.picture.size() == (64, 48));
+    watched.heard.session.close();
+    // Who chose the demonstration keeps it, and who records keeps the recording.
+    for (source, records) in [("demo", false), ("", true)] {
+        let mut watched = Watched::begin(source, folder.path());
+        watched.until("the demonstration", is_running);
+        if records {
+            let film = folder.path().join("film.y4m").display().to_string();
+            watched.session.send(Request::StartOutput(Output { name: film, is_camera: false }));
+            watched.until("it records", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));
+        }
+        watched.services.store(true, Ordering::SeqCst);
+        watched.until("it is listed", listed);
+        watched.services.store(false, Ordering::SeqCst);
+        watched.until("it has gone", |told| {
+            assert!(!found(told), "{source}: nothing is taken away");
+            matches!(told, Update::Choices { .. }) && !listed(told)
+        });
+        watched.heard.session.close();
+    }
+}
+
+#[test]
 fn a_folder_of_pictures_plays_is_sought_in_and_repeats() {
     let folder = tempfile::tempdir().unwrap();
     for frame in 0..FRAMES {

@@ -42,6 +42,8 @@ pub struct Plug {
     is_in: Arc<AtomicBool>,
     was_in: bool,
     mode: Option<((u32, u32), f64)>,
+    /// Whether the source is the demonstration for want of the camera.
+    is_fallback: bool,
 }
 
 pub const CAMERA: &str = "/dev/video-test";
@@ -55,7 +57,11 @@ impl Services for Plug {
         Vec::new()
     }
     fn open(&mut self, name: &str, depth_method: Option<DepthMethod>) -> Result<OpenedSource, String> {
-        match (name, self.is_in.load(Ordering::SeqCst)) {
+        let is_in = self.is_in.load(Ordering::SeqCst);
+        self.is_fallback = name.is_empty() && !is_in;
+        match (name, is_in) {
+            ("", true) => self.open(CAMERA, depth_method),
+            ("", false) => self.system.open("demo", depth_method),
             (CAMERA, false) => Err("no such camera".into()),
             (CAMERA, true) => {
                 let ((width, height), fps) = self.mode.unwrap_or(((64, 48), 30.0));
@@ -64,7 +70,7 @@ impl Services for Plug {
                 let (name, has_depth) = (name.into(), source.has_depth());
                 let modes =
                     vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
-                let camera = Camera { modes, faces_user: true, is_relative: false };
+                let camera = Camera { modes, faces_user: true, ..Camera::default() };
                 let (notes, controls) = (Vec::new(), Vec::new());
                 Ok(OpenedSource {
                     name,
@@ -83,6 +89,9 @@ impl Services for Plug {
     fn have_devices_changed(&mut self) -> bool {
         let is_in = self.is_in.load(Ordering::SeqCst);
         std::mem::replace(&mut self.was_in, is_in) != is_in
+    }
+    fn awaited_camera(&mut self) -> Option<String> {
+        (self.is_fallback && self.was_in).then(|| CAMERA.to_owned())
     }
     fn set_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
         assert_eq!(name, CAMERA);
@@ -117,7 +126,7 @@ impl Watched {
         let options = Options { frames: Frames { repeat: true, ..Frames::default() }, ..Options::default() };
         let system = System::new(options, look(), Box::new(NoStore));
         let is_in = Arc::<AtomicBool>::default();
-        let plug = Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None };
+        let plug = Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None, is_fallback: false };
         Self { heard: Heard::begin(Box::new(plug), source, folder), services: is_in }
     }
 }
