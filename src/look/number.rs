@@ -62,7 +62,7 @@ pub fn parse_count<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T, 
 /// Parses the value of a switch: true or false, and other words for them.
 ///
 /// # Errors
-/// `text` is none of these words.
+/// `text` is another word.
 pub fn parse_switch(text: &str) -> Result<bool, String> {
     match text.trim().to_lowercase().as_str() {
         "true" | "t" | "yes" | "y" | "on" | "1" => Ok(true),
