@@ -84,7 +84,7 @@ mod tests {
             assert_eq!((request, state.asked_background()), (None, Some(name.as_str())));
             assert!(matches!(state.source, Source::Running(_)));
             let mut answered = state.clone();
-            assert_eq!(answered.apply(Action::OpenDropped), [open.clone()]);
+            assert_eq!(answered.apply(Action::OpenDropped), std::slice::from_ref(&open));
             assert_eq!((answered.asked_file(), answered.chosen_source.as_ref()), (None, Some(&name)));
             let mut answered = state.clone();
             assert_eq!(answered.apply(Action::UseDroppedAsBackground), [Request::LoadBackground(name.clone())]);
