@@ -149,10 +149,17 @@ fn arrows_in_a_list_that_a_click_opened_belong_to_the_list() {
     window.click(list);
     window.wait(0.2);
     assert!(egui::Popup::is_any_open(&window.ctx));
-    for _ in 0..2 {
-        window.press(Key::ArrowDown, Modifiers::NONE);
-        window.wait(0.1);
+    let is_on_colour = |window: &mut Window| {
+        let focused = window.ctx.memory(|memory| memory.focused()).and_then(|id| window.ctx.read_response(id));
+        focused.zip(window.place_of("Colour")).is_some_and(|(response, at)| response.rect.contains(at))
+    };
+    for _ in 0..4 {
+        if !is_on_colour(&mut window) {
+            window.press(Key::ArrowDown, Modifiers::NONE);
+            window.wait(0.1);
+        }
     }
+    assert!(is_on_colour(&mut window));
     assert_eq!(window.state.look.focus, FocusRule::Auto, "the point of focus stays");
     window.press(Key::Enter, Modifiers::NONE);
     window.wait(0.2);
