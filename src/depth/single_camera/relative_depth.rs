@@ -202,6 +202,8 @@ impl DepthEstimator {
         let size = *size;
         background.clone_from(nearness);
         if subject.iter().all(|&alpha| alpha < 0.5) {
+            // Without a person, the nearest surface is none either.
+            background.iter_mut().for_each(|nearness| *nearness = nearness.min(MAX_BACKGROUND_NEARNESS));
             return;
         }
         known.clear();

@@ -139,6 +139,20 @@ fn each_frame_has_a_mask_of_its_own_at_every_effort() {
     assert!(alone.is_reusable(), "what is near and far is no mask");
 }
 
+/// Without a person, everything is background, also with distances: nothing is in focus in place of the person.
+#[test]
+fn without_a_person_nothing_is_as_near_as_one() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
+    let mut both = SingleCamera::open(Some(&person), Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let mut wall = ColorImage::new(320, 240);
+    wall.rgb.chunks_exact_mut(3).enumerate().for_each(|(at, pixel)| pixel[2] = 128 + (at % 320 / 4) as u8);
+    let map = read(&mut both, &wall, 0);
+    let nearest_m = map.metres.iter().copied().fold(f32::INFINITY, f32::min);
+    assert!(nearest_m > 1.05 * DepthMap::SUBJECT_M && map.farthest_m() > Some(nearest_m), "{nearest_m}");
+}
+
 /// With reuse, pictures that hardly differ share a map, and a change of the picture is followed at once.
 #[test]
 fn still_pictures_share_a_map_and_moved_ones_do_not() {

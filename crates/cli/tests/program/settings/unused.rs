@@ -22,6 +22,7 @@ fn a_picture_without_depth_says_what_that_costs() {
         (&["--focus", "1.2"][..], "--focus 1.2"),
         (&["--refine", "on"], "--refine on"),
         (&["--focus-range", "0.3"], "--focus-range 0.3"),
+        (&["--behind", "color:#00ff00"], "--behind color:#00ff00"),
         (&["--depth-scale", "1000"], "--depth-scale 1000"),
         (&["--preset", "product"], "focus-range = 0.3 of the preset"),
     ] {
@@ -29,6 +30,8 @@ fn a_picture_without_depth_says_what_that_costs() {
         let warning = ran.warning();
         assert!(warning.contains(named) && warning.contains("there is no depth"), "{more:?}: {warning}");
     }
+    let behind = render(&["--behind", "color:#00ff00"]);
+    assert!(behind.done().contains("--behind color:#00ff00 (there is no depth)"), "{}", behind.stderr);
     let tilt = render(&["--effect", "blur", "--tilt", "0.5", "--focus", "1"]);
     assert!(tilt.warning().contains("--tilt 0.5 (the effect is not tilt-shift)"), "{}", tilt.stderr);
     assert!(tilt.warning().contains("--focus 1 (there is no depth)"), "{}", tilt.stderr);
