@@ -54,7 +54,7 @@ const TICK: Duration = Duration::from_millis(20);
 const IDLE_TICK: Duration = Duration::from_millis(100);
 
 /// Longest wait for outputs to show the card.
-const CARD_TIMEOUT: Duration = Duration::from_secs(1);
+const CARD_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Closes and opens a [`Shutter`], and copies pictures behind it, from any thread.
 #[derive(Clone)]

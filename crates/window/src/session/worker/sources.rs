@@ -57,8 +57,8 @@ impl SessionWorker {
         if self.pipeline.is_none() && is_there && is_camera {
             return self.open_source();
         }
-        // A recording would end with its source.
-        if self.config.outputs.iter().all(|output| output.is_camera)
+        // A recording gets no other picture unasked.
+        if self.outputs.list().iter().all(|output| output.is_camera)
             && let Some(camera) = self.config.services.awaited_camera()
         {
             self.events.send_update(Update::CameraFound(camera));
