@@ -139,10 +139,12 @@ fn pair_by_order(
     let filled = fill_gaps(names);
     let Some(frames) = frames else { return Ok(filled) };
     let needed = played.map_or(frames, |played| played.min(frames));
-    match (names.len() as u64, filled.len() as u64) {
-        (count, _) if count == frames || count == needed => Ok(names.to_vec()),
-        (_, count) if (needed..=frames).contains(&count) => Ok(filled),
-        (count, _) => Err(map_count(dir, count, needed)),
+    let suffices = |names: &[String]| (needed..=frames).contains(&(names.len() as u64));
+    match names.len() as u64 {
+        count if count == frames => Ok(names.to_vec()),
+        _ if suffices(&filled) => Ok(filled),
+        _ if suffices(names) => Ok(names.to_vec()),
+        count => Err(map_count(dir, count, needed)),
     }
 }
 
@@ -226,7 +228,12 @@ mod tests {
         // Frames that are not played need none.
         assert_eq!(pair_some(&whole, Some(180), Some(3)).unwrap(), whole);
         assert_eq!(pair_some(&whole, Some(180), Some(2)).unwrap(), whole);
-        assert_eq!(pair_some(&gap, Some(180), Some(4)).unwrap(), filled);
+        for played in [3, 4] {
+            assert_eq!(pair_some(&gap, Some(180), Some(played)).unwrap(), filled, "the numbers are those of frames");
+        }
+        assert_eq!(pair_some(&gap, Some(3), Some(2)).unwrap(), gap);
+        let times = ["10.npy", "20.npy", "31.npy"];
+        assert_eq!(pair_some(&times, Some(4), Some(2)).unwrap(), times);
         assert_eq!(pair_some(&whole, Some(3), Some(9)).unwrap(), whole);
         let said = pair_some(&whole, Some(180), Some(5)).unwrap_err().to_string();
         assert!(said.contains("3 depth maps for 5 pictures"), "{said}");

@@ -2,8 +2,8 @@
 //!
 //! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`, the version of the program
 //! (`Software`) and the kind of the source (`Source`). `NAME-color.png` is the picture before the blur, `NAME-depth.pfm`
-//! the depth that the blur used, in metres. The inputs are never inside `NAME.png`: whoever gives it away would give
-//! away the room behind the blur.
+//! the depth that the blur used, in metres. The inputs are never inside `NAME.png`, which may be given away: they show the
+//! room behind the blur.
 
 use std::fs;
 use std::io::ErrorKind;

@@ -202,7 +202,7 @@ impl DepthEstimator {
         let size = *size;
         background.clone_from(nearness);
         if subject.iter().all(|&alpha| alpha < 0.5) {
-            // Without a person, the nearest surface is none either.
+            // Without a person, the nearest surface stays background, too.
             background.iter_mut().for_each(|nearness| *nearness = nearness.min(MAX_BACKGROUND_NEARNESS));
             return;
         }

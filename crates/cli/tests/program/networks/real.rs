@@ -125,7 +125,7 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
     assert!(read("r.png") == read("s/000000.png"));
 }
 
-/// Whom the networks find in a plate, or nowhere in a picture, costs a warning.
+/// A person in a plate, and a picture without one, cost a warning each.
 #[test]
 #[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
 fn a_person_in_a_plate_and_nobody_in_a_picture_are_said() {
