@@ -78,7 +78,7 @@ const DOORS: [(&str, &[&str]); 37] = [
     ),
     ("winit", &["window/present", "window/window"]),
     ("zbus", &["control/bus", "window/window"]),
-    ("zune_jpeg", &["capture"]),
+    ("zune_jpeg", &["capture", "recording"]),
 ];
 
 /// Crates of the workspace above the library.

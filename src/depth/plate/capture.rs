@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(add(&passing, 200, Some(&person)), moves, "who stands still for a moment");
         assert_eq!(add(&passing, 1200, Some(&person)), rests);
         assert_eq!(add(&room, 1300, Some(&person)), moves);
-        // Whoever knows that it is nobody leaves the mask out.
+        // A caller who knows that it is no person leaves the mask out.
         for step in 0..Capture::PICTURES as u64 {
             match add(&room, 1400 + 100 * step, None) {
                 CaptureResult::Finished(plate) => return assert!(plate == room),

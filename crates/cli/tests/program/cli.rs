@@ -88,7 +88,7 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
         (&["render", "x.png"], "--out"),
         (&["frobnicate"], "frobnicate"),
         (&["aperture"], "--out"),
-        (&["aperture", "--out", "x", "--size", "3"], "5..=257"),
+        (&["aperture", "--out", "x", "--size", "3"], "from 5 to 257"),
         (&["aperture", "--out", "x", "--apertures", "disc,blob"], "polygon:N"),
         (&["aperture", "--out", "x", "--apertures", "disc,disc"], "twice"),
         (&["config", "dump", "--rim", "1.5"], "from 0 to 1"),

@@ -56,6 +56,9 @@ const ONLY_CHECKED: [(&str, &str); 12] = [
 /// A missing settings file: the program parses all other arguments before it refuses this one.
 const NO_SETTINGS: &str = "no-settings.toml";
 
+/// Commands that read no settings.
+const WITHOUT_SETTINGS: [&str; 6] = ["completions", "ctl", "devices", "doctor", "models", "service"];
+
 /// The state of a page's run: a user's folder with the repository's recordings, and pictures by the pages' file names.
 struct Follower {
     folder: tempfile::TempDir,
@@ -132,8 +135,8 @@ impl Follower {
         until("the stream answers", Duration::from_secs(60), answers);
     }
 
-    /// Checks that the program accepts the arguments of a command that cannot run here; unavailable sources become
-    /// `demo`.
+    /// Checks that the program accepts the arguments of a command that cannot run here, which settings that are not there
+    /// or `--help` keep from running; unavailable sources become `demo`.
     fn check(&self, command: &str) -> Result<(), String> {
         let command = command.split(['>', '|']).next().unwrap_or_default().trim_end();
         let mut words: Vec<&str> = command.split(' ').collect();
@@ -144,9 +147,15 @@ impl Follower {
                 *source = "demo";
             }
         }
-        let ran = self.output(&format!("{} --config {NO_SETTINGS}", words.join(" ")));
+        let reads_settings = !matches!(words[..], [_, command, ..] if WITHOUT_SETTINGS.contains(&command));
+        let end = if reads_settings { format!("--config {NO_SETTINGS}") } else { "--help".to_owned() };
+        let ran = self.output(&format!("{} {end}", words.join(" ")));
         let said = String::from_utf8_lossy(&ran.stderr);
-        match ran.status.code() == Some(1) && said.contains(NO_SETTINGS) {
+        let is_accepted = match reads_settings {
+            true => ran.status.code() == Some(1) && said.contains(NO_SETTINGS),
+            false => ran.status.success(),
+        };
+        match is_accepted {
             true => Ok(()),
             false => Err(said.into_owned()),
         }

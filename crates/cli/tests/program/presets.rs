@@ -94,7 +94,7 @@ fn wrong_presets_cost_one_line_that_names_those_there_are() {
         ran.refused(2, &[said, all]);
     }
     let home = Home::new().with_settings("[presets.mine]\nrim = 0.1\nto = \"null\"\n");
-    let ran = home.run(&["devices"]);
+    let ran = home.run(&["config", "dump"]);
     assert!(ran.code == 2 && ran.stderr.contains("config.toml:3: there is no setting 'to'"), "{}", ran.stderr);
 }
 

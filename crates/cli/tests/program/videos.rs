@@ -193,9 +193,7 @@ fn a_list_of_videos_is_not_read_whatever_its_name() {
         assert!(!home.path("take").exists());
     }
     // Videos of all usual kinds are read.
-    for name in
-        "a.mov a.mkv a.webm a.avi a.ts a.mpg a.flv a.ogv a.wmv a.y4m a.gif a.nut a.mxf a.3gp a.h264 a.mjpeg".split(' ')
-    {
+    for name in "a.mov a.mkv a.webm a.avi a.ts a.mpg a.flv a.ogv a.wmv a.y4m a.gif a.3gp".split(' ') {
         let size = if name == "a.3gp" { "176x144" } else { "64x48" };
         ffmpeg(&format!(
             "-i clip.mp4 -an -r 25 -t 0.4 -vf scale={}:flags=neighbor,format=yuv420p {name}",

@@ -3,8 +3,9 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout, Rect,
-    Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Label, Layout,
+    PointerButton, Rect, Response, RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui,
+    Vec2, WidgetInfo, pos2,
 };
 
 use super::theme::{Colors, ROW, medium_font};
@@ -246,17 +247,23 @@ pub fn add_dropdown<'a, T: PartialEq>(
     options: impl IntoIterator<Item = (String, &'a str, T)>,
     chosen: &T,
 ) -> Option<T> {
-    let mut picked = None;
+    let (mut picked, mut is_chosen_by_key) = (None, false);
     let menu = ComboBox::from_id_salt(what).selected_text(shown).truncate().show_ui(ui, |ui| {
         for (name, hint, option) in options {
             let is_chosen = option == *chosen;
-            if ui.selectable_label(is_chosen, name).tooltip(hint).clicked() {
+            let item = ui.selectable_label(is_chosen, name).tooltip(hint);
+            if item.clicked() {
                 // egui closes the list by itself only after a click of the pointer.
                 ui.close();
+                is_chosen_by_key = !item.clicked_by(PointerButton::Primary);
                 picked = Some(option).filter(|_| !is_chosen);
             }
         }
     });
+    if is_chosen_by_key {
+        // The item that had the focus is gone.
+        menu.response.request_focus();
+    }
     // Linux's screen readers get no value of a list, so its name has it.
     let what = tr(what);
     let name = if shown.starts_with(what) { shown.to_owned() } else { format!("{what}: {shown}") };

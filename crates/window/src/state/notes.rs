@@ -59,7 +59,7 @@ mod tests {
     fn a_message_goes_with_its_reason() {
         let mut state = state();
         let says = |state: &super::State, text: &str| state.notes.iter().any(|note| note.text == text);
-        state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
+        state.outputs = vec![Output { name: "take.mp4".into(), is_camera: false }];
         state.apply(Action::Freeze(true));
         assert!(says(&state, OUTPUTS_CONTINUE));
         state.apply(Action::Freeze(false));

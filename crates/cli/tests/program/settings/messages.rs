@@ -16,7 +16,7 @@ fn numbers_below_zero_reach_the_option_that_they_are_for() {
         ("--rim", "-0.1", "from 0 to 1"),
         ("--highlights", "-1", "from 0 to 1000"),
         ("--depth-scale", "-5000", "above 0"),
-        ("--depth-invalid", "-1", "0..=65535"),
+        ("--depth-invalid", "-1", "from 0 to 65535"),
         ("--f-number", "-2", "above 0"),
         ("--tilt", "-1", "0.6:0.1:15"),
         ("--frames", "-1", "use a whole number from 1"),
