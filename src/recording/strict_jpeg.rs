@@ -129,14 +129,14 @@ mod tests {
             let closed = [&file[..usize::midpoint(scan + 14, file.len())], &END].concat();
             assert!(is_truncated(read(&closed)), "{} bytes", file.len());
         }
-        // Progressive pictures have one scan after the other; of the last one, the end alone refines the picture.
+        // A progressive picture that ends in any scan but the last, which only refines it, is refused as cut or as damaged.
         let progressive = FILES[4];
         let is_scan = |at: &usize| progressive[*at..].starts_with(&[0xFF, 0xDA]);
         let scans: Vec<usize> = (0..progressive.len()).filter(is_scan).collect();
         assert!(scans.len() > 2);
         for pair in scans.windows(2) {
             let closed = [&progressive[..usize::midpoint(pair[0] + 14, pair[1])], &END].concat();
-            assert!(is_truncated(read(&closed)), "the scan at byte {}", pair[0]);
+            assert!(read(&closed).is_err(), "the scan at byte {}", pair[0]);
         }
     }
 }
