@@ -10,7 +10,7 @@ use crate::files::{data, input, trusted};
 const VARIABLE: &str = "BOKEHCAM_MODELS";
 
 /// Returns the folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME`, those of the program
-/// ([`program_folders`]) or `$BOKEHCAM_MODELS` in their place, and `bokehcam/models` in each of `$XDG_DATA_DIRS`.
+/// (`program_folders`) or `$BOKEHCAM_MODELS` in their place, and `bokehcam/models` in each of `$XDG_DATA_DIRS`.
 pub fn model_folders() -> Vec<PathBuf> {
     let of_data = |folder: PathBuf| folder.join("bokehcam/models");
     let of_program = match trusted::absolute_env_path(VARIABLE) {

@@ -43,6 +43,7 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
     assert_eq!(has(&window, 'É'), [true; 2]);
     let Source::Running(running) = &mut window.state.source else { unreachable!() };
     running.label = "ДΩ中한".into();
+    window.state.sources.clear();
     window.pass(Vec::new());
     receiver.recv_timeout(PATIENCE).expect("fonts are found");
     system.install(&window.ctx);
@@ -51,5 +52,5 @@ fn signs_of_other_scripts_come_from_the_systems_fonts_once_a_name_has_them() {
         assert_eq!(has(&window, sign), [true; 2], "{sign}");
     }
     assert_eq!(has(&window, '한'), [false; 2], "what no font has stays a box");
-    assert!(window.texts().iter().any(|text| text.starts_with("ДΩ中한")), "{:?}", window.texts());
+    assert!(window.texts().iter().any(|text| text.contains("ДΩ中한")), "{:?}", window.texts());
 }
