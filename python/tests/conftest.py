@@ -50,7 +50,8 @@ def program(tmp_path_factory):
         pytest.skip("BOKEHCAM_PROGRAM does not name the program (python/test does)")
     home = tmp_path_factory.mktemp("home")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("BOKEHCAM_")}
-    environment |= {"HOME": str(home), "XDG_CONFIG_HOME": str(home)}
+    # Without the networks beside a program that was built.
+    environment |= {"HOME": str(home), "XDG_CONFIG_HOME": str(home), "BOKEHCAM_MODELS": os.devnull}
 
     def run(*arguments):
         words = [path, *map(str, arguments)]
