@@ -119,6 +119,7 @@ mod tests {
     #[test]
     fn a_worker_that_sleeps_through_passes_is_kept_off_the_last_callers_cpu_alone() {
         let all = sched_getaffinity(None).unwrap();
+        let cpus: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&cpu| all.is_set(cpu)).take(2).collect();
         let (placement, is_over) = (Placement::new(), AtomicBool::new(false));
         let [allowed, afterwards] = thread::scope(|scope| {
             let worker = scope.spawn(|| {
@@ -132,14 +133,17 @@ mod tests {
             while !placement.is_asleep.load(Ordering::Relaxed) {
                 thread::yield_now();
             }
-            let cpus = (0..CpuSet::MAX_CPU).filter(|&cpu| all.is_set(cpu)).take(2);
-            cpus.for_each(|own| placement.keep_off(own as u32));
+            cpus.iter().for_each(|&own| placement.keep_off(own as u32));
             let allowed = sched_getaffinity(Pid::from_raw(placement.thread_id.load(Ordering::Relaxed))).unwrap();
             is_over.store(true, Ordering::Relaxed);
             worker.thread().unpark();
             [allowed, worker.join().unwrap()]
         });
         assert_eq!(allowed.count(), (all.count() - 1).max(1));
+        // Of two, only the last one is excluded.
+        if let [earlier, last] = cpus[..] {
+            assert!(allowed.is_set(earlier) && !allowed.is_set(last));
+        }
         assert!(afterwards == all);
     }
 }

@@ -1,9 +1,9 @@
-//! MCAP files that claim or become more than any recording has.
+//! MCAP files that claim or become more than any recording has, or other than they state.
 
 use bokehcam::recording::Options;
 
 use super::super::{Scene, assert_says};
-use super::{CAMERA, TestTopic, open, record, text, unchunked};
+use super::{CAMERA, LZ4, TestTopic, ZSTD, open, record, text, unchunked};
 
 #[test]
 fn a_file_of_too_many_topics_is_refused() {
@@ -49,4 +49,21 @@ fn chunks_that_grow_without_end_are_refused() {
     };
     assert!(fault(300).contains("its chunks are compressed to less than a 200th"), "{}", fault(300));
     assert!(!fault(1).contains("compressed"), "{}", fault(1));
+}
+
+#[test]
+fn a_compressed_chunk_that_is_not_what_its_record_states_is_left_out() {
+    let scene = Scene::new();
+    for file in [LZ4, ZSTD] {
+        let chunk = file.windows(4).position(|bytes| bytes == b"lz4\x05" || bytes == b"zstd").unwrap();
+        // The record states length and checksum before the name's length and the name.
+        for (at, fault) in [(chunk - 16, "its length is wrong"), (chunk - 8, "its checksum is wrong")] {
+            for change in [1, 0xFF] {
+                let mut other = file.to_vec();
+                other[at] = other[at].wrapping_add(change);
+                let parts = ["no topics", "the chunk at byte 79 is left out", fault];
+                assert_says(open(&scene, "take.mcap", &other, &Options::default()), &parts);
+            }
+        }
+    }
 }
