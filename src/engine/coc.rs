@@ -224,25 +224,12 @@ impl CocCalculator {
     /// Computes the CoC of the frame at `time_ns` and finishes `map`. The focus is measured on the raw map, before
     /// holes are filled.
     pub fn compute(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        self.compute_with_steps(map, color, time_ns, |_| ())
-    }
-
-    /// Does the same as [`CocCalculator::compute`], and calls `done` with the name of each finished step: for benchmarks.
-    #[doc(hidden)]
-    pub fn compute_with_steps(
-        &mut self,
-        map: &mut DepthMap,
-        color: &ColorImage,
-        time_ns: u64,
-        mut done: impl FnMut(&'static str),
-    ) -> CocField {
         let (lens, range_m, max_coc_px) = match self.rule {
             CocRule::Fixed(field) => return field,
             CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
         };
         let focus_m = self.focus.focus_m(map, time_ns);
         let field = lens.coc_field((focus_m, range_m), color.width, max_coc_px);
-        done("focus");
         // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
             match &mut self.postprocessor {
@@ -255,15 +242,12 @@ impl CocCalculator {
                     self.matting.set_device_frame(refiner.device_frame());
                 }
             }
-            done(if matches!(self.postprocessor, Postprocessor::Refine(_)) { "refine" } else { "fill" });
             self.mark_covered_background(map, color, &field);
             self.estimate_matte(map, color, &field);
-            done("matte");
         }
         // Only now, with the matte known, does the background memory learn from this frame and fill what the subject
         // hides.
         self.fill_hidden_background(map, color, &field, Some(time_ns));
-        done("memory");
         field
     }
 

@@ -1,6 +1,5 @@
-//! `bench`: measures the blur on this machine, or the whole chain of a stream.
+//! `bench`: measures the blur on this machine.
 
-mod chain;
 mod picture;
 
 use std::collections::BTreeMap;
@@ -25,7 +24,7 @@ use bokehcam::link::pool::Pool;
 use bokehcam::look::number::{in_range_parser, parse_count, whole_number_parser};
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, SourceDepth, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::source::{self, DepthChoice, Size, SourceName};
+use bokehcam::source::{self, DepthChoice, Size};
 
 /// Frames measured by default, if the time limit allows.
 const FRAMES: u32 = 20;
@@ -40,16 +39,13 @@ const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms  
 /// Measure the blur on this machine, without reading or writing files
 ///
 /// Blurs one picture repeatedly, one frame at a time, for every combination of the given lists. Times are per frame, in
-/// milliseconds, from submission to result. With --chain: the frames of a source pass through all stages of a stream,
-/// one at a time, and each stage is measured.
+/// milliseconds, from submission to result.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam bench
   bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
-  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl
-  bokehcam bench --chain
-  bokehcam bench --chain demo --refine on --quality draft,balanced")]
+  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl")]
 pub struct BenchCommand {
     /// Picture sizes
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
@@ -57,7 +53,7 @@ pub struct BenchCommand {
     /// Blur radii at infinity, in pixels [default: height / 45]
     #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = in_range_parser(0.0..=MAX_RADIUS_PX))]
     coc: Vec<f32>,
-    /// Quality levels [default: balanced; with --chain all]
+    /// Quality levels [default: balanced]
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
           value_parser = options::named_value_parser::<Quality>())]
     quality: Vec<Quality>,
@@ -86,13 +82,6 @@ pub struct BenchCommand {
     /// Also the median of each pass, in milliseconds
     #[arg(long)]
     passes: bool,
-    /// Measure all stages of a stream instead: reading, depth, blur at each quality, and writing for a virtual camera;
-    /// from a recording, a photo, `demo` or `synthetic`
-    #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name_parser(),
-          conflicts_with_all = ["sizes", "coc", "scene", "passes", "benched_fps"])]
-    chain: Option<SourceName>,
-    #[command(flatten)]
-    depth: options::Depth,
     #[command(flatten)]
     blur: options::Blur,
 }
@@ -117,9 +106,6 @@ struct Measurement {
 /// # Errors
 /// Fails if the options conflict, the backend is missing, or the blur fails.
 pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
-    if let Some(source) = &command.chain {
-        return chain::run(command, source, given);
-    }
     if command.blur.depth.is_external() || command.blur.depth == DepthChoice::Stereo {
         let what = "--depth is for `stream`: the measured scene has its own depth; leave --depth out, or use none";
         return Err(CliError::Usage(what.to_string()));

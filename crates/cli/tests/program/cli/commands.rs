@@ -122,34 +122,6 @@ fn benched_frames_arrive_at_the_given_rate() {
     run(&["bench", "--sizes", "17x13", "--backend", "cpu", "--frames", "8", "--fps", "20", "--json"]).done();
     assert!(began.elapsed() >= std::time::Duration::from_secs(8) / 20);
     run(&["bench", "--fps", "0"]).refused(2, &["--fps", "from 1 to 1000"]);
-    run(&["bench", "--chain", "--fps", "30"]).refused(2, &["--fps"]);
-}
-
-#[test]
-fn bench_measures_each_stage_of_the_chain() {
-    let home = recorded();
-    let args = ["bench", "--chain", "recording", "--quality", "draft,balanced", "--frames", "3", "--backend", "cpu"];
-    let ran = home.run(&[&args[..], &["--json"]].concat());
-    assert_eq!((ran.done(), ran.stdout.lines().count()), ("", 1));
-    let chain = ran.json();
-    assert_eq!((&chain["size_px"], &chain["frames"]), (&serde_json::json!([64, 48]), &serde_json::json!(3)));
-    let stages = chain["stages"].as_array().unwrap();
-    let names: Vec<&str> = stages.iter().map(|stage| stage["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["decode", "read depth", "focus", "refine", "matte", "memory", "encode"]);
-    let sum_ms: f64 = stages.iter().map(|stage| stage["cpu_ms"].as_f64().unwrap()).sum();
-    let levels = chain["levels"].as_array().unwrap();
-    assert_eq!((&levels[0]["quality"], &levels[1]["quality"], levels.len()), (&"draft".into(), &"balanced".into(), 2));
-    for level in levels {
-        let [cpu_ms, blur_ms] = [&level["cpu_ms"], &level["blur"]["cpu_ms"]].map(|ms| ms.as_f64().unwrap());
-        assert!(blur_ms > 0.0 && (cpu_ms - blur_ms - sum_ms).abs() < 1e-6, "{level}: {sum_ms}");
-        assert!(level["frames_per_s"].as_f64().unwrap() <= 1e3 * chain["cores"].as_f64().unwrap() / cpu_ms + 1e-6);
-    }
-    let table = home.run(&args);
-    assert_eq!((table.code, table.stdout.matches(" frames a second: ").count()), (0, 2), "{}", table.stdout);
-    let demonstration = run(&["bench", "--chain", "--quality", "draft", "--frames", "1", "--backend", "cpu"]);
-    assert!(demonstration.code == 0 && demonstration.stdout.contains("640x360"), "{}", demonstration.stderr);
-    let refused = home.run(&["bench", "--chain", "recording", "--sizes", "64x48"]);
-    assert_eq!((refused.code, refused.stdout.as_str()), (2, ""), "{}", refused.stderr);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Extracts the commands of a page.
 
 /// Commands with placeholders, and the commands that run instead.
-const OPEN: [(&str, &str); 18] = [
+const OPEN: [(&str, &str); 17] = [
     ("bokehcam COMMAND", "bokehcam render"),
     // Another name than that of the running stream.
     ("bokehcam stream ... --name desk", "bokehcam stream demo --frames 1 --to null --name other"),
@@ -12,7 +12,6 @@ const OPEN: [(&str, &str); 18] = [
     ("METRES", "1.2"),
     ("DAMAGED", "depth.png"),
     ("off|on", "on"),
-    ("--chain DIR", "--chain demo"),
     ("WxH", "64x36"),
     ("--coc PX", "--coc 4"),
     ("--threads N", "--threads 1"),
