@@ -42,7 +42,7 @@ const FIRST_PAGE_EXTRA: [(&str, &[&str]); 5] = [
 const LATER_PAGES: [(&str, &[&str]); 6] = [
     ("stream", &["name", "tray"]),
     ("preview", &["name", "loop", "frames", "on-demand"]),
-    ("render", &["debug-dir", "mask-grow", "mask-feather", "out-format"]),
+    ("render", &["mask-grow", "mask-feather", "out-format"]),
     ("bench", &["preset", "depth", "effect", "focus", "blur", "behind", "follow", "aperture", "highlights"]),
     ("plate", &["loop", "frames"]),
     ("bokehcam", &["log-format", "config"]),

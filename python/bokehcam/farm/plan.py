@@ -36,7 +36,7 @@ OWN_FLAGS = {
         "--config",
         "--log-format",
     ),
-    "render": ("--out", "--out-format", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
+    "render": ("--out", "--out-format", "--depth-map", "--mask", "--like", "--force", "--config", "--log-format"),
 }
 MAX_NAME_BYTES = 255
 

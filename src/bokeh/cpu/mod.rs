@@ -55,7 +55,6 @@ use crate::optics::CocField;
 
 pub use banded::{BandedBokeh, MAX_WHOLE_PIXELS};
 pub use pixels::{Pixels, Radii, Sample};
-pub use unpack::{compression_factor, expansion_factor};
 
 // Content is kept in whole strips.
 const _: () = assert!(CONTENT_BIN_W == rows::STRIP);

@@ -92,16 +92,6 @@ impl<const W: usize> Surfaces<W> {
         }
         shown
     }
-
-    /// Returns a composited pixel: linear r, g, b, and the CoC of the nearer surface.
-    pub fn composite_pixel(&self, x: usize) -> [f32; 4] {
-        let back = self.back.0.each_ref().map(|plane| plane[x]);
-        if !self.mixed || self.alpha.0[x] <= 0.0 {
-            return back;
-        }
-        let (front, alpha) = (self.front.0.each_ref().map(|plane| plane[x]), self.alpha.0[x]);
-        std::array::from_fn(|p| if p < 3 { back[p] + alpha * (front[p] - back[p]) } else { front[p] })
-    }
 }
 
 impl<'a> InputFrame<'a> {

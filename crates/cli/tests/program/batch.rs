@@ -150,7 +150,6 @@ fn what_cannot_be_for_many_is_refused_before_anything_is_written() {
         (&["none"], "none: no picture there (PNG, JPEG, TIFF, WebP, BMP or HEIC)"),
         (&["none/*.png"], "none/*.png: no picture there (PNG, JPEG, TIFF, WebP, BMP or HEIC)"),
         (&["shots/***"], "shots/***: this is no pattern"),
-        (&["shots", "--debug-dir", "dir"], "--debug-dir shows the blur of one picture"),
         (&["shots", "--depth-map", "shots/a-depth.png"], "--depth-map shots/a-depth.png: for many pictures this is"),
         (&["shots", "--mask", "shots/b.png"], "--mask shots/b.png: for many pictures this is a folder"),
         (&["shots", "--depth", "stereo"], "--depth stereo: "),

@@ -19,7 +19,6 @@ mod colors;
 mod ctl;
 mod damage;
 #[cfg(feature = "lab")]
-mod debug_dir;
 #[cfg(feature = "gpu")]
 mod depth_on_gpu;
 mod disparity;

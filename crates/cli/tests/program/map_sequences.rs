@@ -5,8 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use bokehcam::engine::still;
 use bokehcam::frame::ColorImage;
+use bokehcam::look::{Look, SourceDepth, Strength};
+use bokehcam::optics::CocField;
+use bokehcam::recording::DepthUnit;
 use bokehcam::recording::still::{read_color, write_color};
+use bokehcam::source::options::Depth;
+use bokehcam::source::photo::read_depth_file;
 
 use crate::common::color;
 use crate::program::{Home, Ran};
@@ -163,21 +169,20 @@ fn a_focus_without_metres_is_a_place_and_refocusing_keeps_the_lens() {
     let codes = |x: u32| [255, 128, 1][(3 * x / width) as usize];
     image::GrayImage::from_fn(width, height, |x, _| [codes(x)].into()).save(home.path("map.png")).unwrap();
     let given = ["render", "in.png", "--depth-map", "map.png", "--backend", "cpu", "--force"];
-    let plan = |focus: &str| {
-        let ran = home.run(
-            &[
-                &given[..],
-                &["--depth-unit", "inverse", "--blur", "8", "--focus", focus, "--out", "out.png", "--debug-dir", "d"],
-            ]
-            .concat(),
-        );
+    let inverse = Depth { depth_unit: Some(DepthUnit::Inverse), ..Depth::default() };
+    let map = read_depth_file(&home.path("map.png"), &inverse, (width, height)).unwrap().map;
+    for focus in ["0", "0.25", "0.5", "1"] {
+        let wanted = ["--depth-unit", "inverse", "--blur", "8", "--focus", focus, "--out", "out.png"];
+        let ran = home.run(&[&given[..], &wanted].concat());
         let note = format!("--focus {focus}: a place in relative depth, from 0 (nearest) to 1 (farthest)");
         assert!(ran.done().contains(&note), "{}", ran.stderr);
-        crate::program::json(home.path("d/plan.json"))
-    };
-    for focus in ["0", "0.25", "0.5", "1"] {
-        let plan = plan(focus);
-        let (low, high) = (plan["coc_px"][0].as_f64().unwrap(), plan["coc_px"][1].as_f64().unwrap());
+        let look = Look { focus: focus.parse().unwrap(), strength: Strength::AtInfinity(8.0), ..Look::default() };
+        let look = look.for_source(SourceDepth { has_depth: true, is_relative: true, size: (width, height) });
+        let measured = still::Depth::Measured(map.clone());
+        let (field, map) = still::compute_coc_and_depth(&look, &mut checks.clone(), Some(measured)).unwrap();
+        let CocField::Depth(lens) = field else { panic!("{field:?}") };
+        let radii_px = map.unwrap().metres.into_iter().map(|metres| f64::from(lens.coc_px(metres)));
+        let (low, high) = radii_px.fold((0.0, 0.0), |(low, high): (f64, f64), px| (low.min(px), high.max(px)));
         let place: f64 = focus.parse().unwrap();
         assert!(
             (low + 8.0 * place).abs() < 0.1 && (high - 8.0 * (1.0 - place)).abs() < 0.1,

@@ -33,7 +33,6 @@ fn a_source_is_never_a_target() {
         "render self/rgb/000000.png --effect blur --out self/rgb/000000.png --force",
         "render self/rgb/000000.png --effect blur --out link/rgb/000000.png --force",
         "render self/rgb/000000.png --depth-map self/depth/000000.png --out self/depth/000000.png --force",
-        "render self/rgb/000000.png --effect blur --out new.png --debug-dir self/rgb --force",
         "depth self/rgb/000000.png self/rgb/000001.png --out self/rgb/000001.png --force",
         "depth self/rgb/000000.png self/rgb/000001.png --out d.pfm --preview link/rgb/000000.png --force",
     ] {

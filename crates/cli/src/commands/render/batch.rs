@@ -68,9 +68,6 @@ struct MapFolders<'a> {
 /// Fails if the command line does not fit many pictures, before anything is written; and at the end if a picture
 /// failed, or was not begun because of Ctrl-C.
 pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSettings) -> Result<(), CliError> {
-    if command.debug_dir.is_some() {
-        return Err(CliError::Usage("--debug-dir shows the blur of one picture, and here are many".to_owned()));
-    }
     let look = build_look(command)?;
     let (depth, mask) = (command.depth_map.as_deref(), command.mask.as_deref());
     let maps = MapFolders {

@@ -2,8 +2,6 @@
 
 mod batch;
 mod blur;
-mod debug;
-mod debug_pictures;
 mod input;
 mod listing;
 mod map_folder;
@@ -34,7 +32,6 @@ use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::still::Depth;
-use bokehcam::files::place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::number::whole_number_parser;
 use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
@@ -58,7 +55,6 @@ Examples:
   bokehcam render photo.jpg --depth-map midas.png --depth-unit inverse --out portrait.png
   bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
   bokehcam render photo.jpg --effect blur --blur 12 --aperture heart --out hearts.png
-  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
   bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
   bokehcam render shots/ --out blurred/
   bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
@@ -101,10 +97,6 @@ pub struct RenderCommand {
     /// Format of the results of many pictures, png, jpg, tif or webp [default: that of each picture]
     #[arg(long, value_name = "FORMAT", value_parser = names::parse_name::<PhotoFormat>)]
     out_format: Option<PhotoFormat>,
-    /// Write all intermediate results of the blur to this folder, as PNG: the CoC, each bin before and after its
-    /// filters, the filled background; and plan.json (CPU executor)
-    #[arg(long, value_name = "DIR")]
-    debug_dir: Option<PathBuf>,
     #[command(flatten)]
     orientation: options::Orientation,
     #[command(flatten)]
@@ -148,18 +140,8 @@ pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSe
 /// Refuses outputs that exist, without `--force`, or that are inputs.
 fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
     check_picture_name("--out", &command.out)?;
-    let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
-    refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    for source in &input_files(command) {
-        refuse_overwriting_source("--out", &command.out, source)?;
-        // That folder's files have fixed names, which may match a source.
-        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
-            && source.parent().is_some_and(|folder| place::resolve_links(folder) == place::resolve_links(dir))
-        {
-            refuse_overwriting_source("--debug-dir", dir, source)?;
-        }
-    }
-    Ok(())
+    refuse_overwrite([command.out.as_path()], command.output.force)?;
+    input_files(command).iter().try_for_each(|source| refuse_overwriting_source("--out", &command.out, source))
 }
 
 /// Builds the look, for depth that a picture can have.
@@ -180,10 +162,6 @@ fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
     let look = look::build_look(&command.blur, &command.computing.quality)?;
     if let Background::Video(video) = &look.background {
         log::note(&format!("--behind video:{}: a picture shows its first frame", video.file.path.display()));
-    }
-    if look.background == Background::Transparent && command.debug_dir.is_some() {
-        let what = "--debug-dir shows a blur over a background: leave --behind transparent out";
-        return Err(CliError::Usage(what.to_owned()));
     }
     Ok(look)
 }
@@ -221,10 +199,7 @@ fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result
     plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
     let computing = command.computing.to_compute_options();
-    let executor = match &command.debug_dir {
-        Some(dir) => debug::blur_and_dump(&mut photo, depth, &look, &computing, (dir, command.output.force))?,
-        None => blur::blur(&mut photo, depth, &look, &computing)?,
-    };
+    let executor = blur::blur(&mut photo, depth, &look, &computing)?;
     let lost = photo.write(&command.out, command.output.force)?;
     if !lost.is_empty() {
         log::note(&format!("not in {}: {}", command.out.display(), lost.join(", ")));

@@ -1,7 +1,7 @@
 //! Extracts the commands of a page.
 
 /// Commands with placeholders, and the commands that run instead.
-const OPEN: [(&str, &str); 17] = [
+const OPEN: [(&str, &str); 16] = [
     ("bokehcam COMMAND", "bokehcam render"),
     // Another name than that of the running stream.
     ("bokehcam stream ... --name desk", "bokehcam stream demo --frames 1 --to null --name other"),
@@ -19,7 +19,6 @@ const OPEN: [(&str, &str); 17] = [
     ("--like FILE.png", "--like NAME.png"),
     ("--out FILE.png", "--out sentence.png"),
     ("--out DIR", "--out dir/"),
-    ("--debug-dir DIR", "--debug-dir steps/"),
 ];
 
 /// Returns the commands of a page in order, without comments and with continuation lines joined.

@@ -38,7 +38,6 @@ fn a_radius_beyond_the_diagonal_is_refused_once_the_size_is_known() {
     let said = ["a blur radius of 81 px is too large: for pictures of 64x48, use at most 80 px"];
     render(&["--effect", "blur", "--coc-at-infinity", "81"]).refused(2, &said);
     render(&["--depth-map", "depth.png", "--max-coc", "81"]).refused(2, &said);
-    render(&["--effect", "blur", "--coc-at-infinity", "81", "--debug-dir", "in"]).refused(2, &said);
     for more in [
         &["--effect", "blur", "--coc-at-infinity", "80"][..],
         &["--effect", "tilt-shift", "--coc-at-infinity", "80"],
