@@ -22,6 +22,7 @@ use crate::{errors, pictures};
 #[pyclass(frozen, module = "bokehcam._core")]
 pub struct Still {
     look: Look,
+    threads: Option<usize>,
     /// `None` if pictures pass unchanged.
     executor: Option<Mutex<SliceBlur>>,
 }
@@ -47,7 +48,7 @@ impl Still {
             .map_err(errors::value)?;
         let executor = look.blur_settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
         let executor = py.detach(|| executor.transpose()).map_err(errors::value)?.map(Mutex::new);
-        Ok(Self { look, executor })
+        Ok(Self { look, threads, executor })
     }
 
     /// Blurs `image` (height, width, 3) into `out`; its `depth` in metres may have holes and noise.
@@ -77,9 +78,9 @@ impl Still {
         if let Some(map) = &map {
             check_depth_size(Path::new("depth"), map.size(), color.size()).map_err(errors::value)?;
         }
-        let look = self.look.clone();
+        let (look, threads) = (self.look.clone(), self.threads);
         let (color, made) = wait_for(py, move || {
-            let made = compute_coc_and_depth(&look, &mut color, map.map(Depth::Measured));
+            let made = compute_coc_and_depth(&look, &mut color, map.map(Depth::Measured), threads);
             (color, made)
         })?;
         let (field, map) = made.map_err(errors::value)?;
@@ -103,7 +104,7 @@ pub fn refine<'py>(
     let look = Look { refine: Refine::On, ..errors::look(&settings)? };
     let (map, mut color) = (pictures::depth(&depth)?, pictures::color(image)?);
     check_depth_size(Path::new("depth"), map.size(), color.size()).map_err(errors::value)?;
-    let made = wait_for(py, move || compute_coc_and_depth(&look, &mut color, Some(Depth::Measured(map))))?;
+    let made = wait_for(py, move || compute_coc_and_depth(&look, &mut color, Some(Depth::Measured(map)), None))?;
     let (_, map) = made.map_err(errors::value)?;
     let map = map.ok_or_else(|| errors::value("refine: the settings are for a blur without depth"))?;
     map.metres.to_pyarray(py).reshape([map.height as usize, map.width as usize])

@@ -49,6 +49,30 @@ def test_other_python_threads_run_while_it_blurs():
     assert during > 1000
 
 
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are not listed")
+def test_a_picture_takes_as_many_threads_as_wanted(portrait):
+    """Its depth is refined on them, too."""
+    names, done = set(), threading.Event()
+
+    def watch():
+        while not done.is_set():
+            for task in os.listdir("/proc/self/task"):
+                try:
+                    with open(f"/proc/self/task/{task}/comm") as comm:
+                        names.add(comm.read().strip())
+                except OSError:
+                    pass
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        bc.render(np.tile(portrait.color, (3, 3, 1)), np.tile(portrait.depth, (3, 3)), refine="on", threads=1)
+    finally:
+        done.set()
+        watcher.join()
+    assert "bokehcam" in names and not [name for name in names if name.startswith("depth-")]
+
+
 def test_threads_that_share_a_renderer_take_turns():
     renderer = bc.Renderer(SIZE, threads=2)
     frames = [frame(seed) for seed in range(4)]

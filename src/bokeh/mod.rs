@@ -196,7 +196,7 @@ pub fn create_blur(
     }
     #[cfg(not(feature = "gpu"))]
     let _ = device;
-    Ok(cpu::create(plan, threads))
+    Ok(Box::new(cpu::BandedBokeh::new(plan, threads)))
 }
 
 /// Creates a GPU executor after checking its results against the CPU's. The fallback to the CPU allocates its buffers
@@ -210,7 +210,7 @@ fn create_gpu_with_fallback(
     gpu::run_self_test(&device)?;
     let gpu = gpu::GpuBokeh::with_device(plan, device)?;
     let plan = plan.clone();
-    let cpu = move || cpu::create(plan, threads);
+    let cpu = move || -> Box<dyn Bokeh> { Box::new(cpu::BandedBokeh::new(plan, threads)) };
     Ok(Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu))))
 }
 

@@ -3,18 +3,16 @@
 
 use std::ops::ControlFlow;
 
-use super::cpu::CpuBokeh;
+use super::cpu::BandedBokeh;
 pub use super::cpu::{Pixels, Radii, Sample};
 use super::plan::Plan;
 use super::{BokehError, Settings};
 use crate::optics::CocField;
 
-/// CPU executor for slices of pictures of one size; allocates nothing per picture.
+/// CPU executor for slices of pictures of one size; allocates nothing per picture, unless it is blurred in bands.
 pub struct SliceBlur {
-    settings: Settings,
     size: (u32, u32),
-    threads: Option<usize>,
-    cpu: CpuBokeh,
+    cpu: BandedBokeh,
 }
 
 impl SliceBlur {
@@ -24,18 +22,7 @@ impl SliceBlur {
     /// The blur is too wide, or the picture too large ([`Settings::check`]).
     pub fn new(settings: &Settings, size: (u32, u32), threads: Option<usize>) -> Result<Self, BokehError> {
         settings.check(size)?;
-        let cpu = CpuBokeh::new(Plan::new(settings, size.0, size.1), threads);
-        Ok(Self { settings: settings.clone(), size, threads, cpu })
-    }
-
-    /// Returns its settings.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// Returns columns and rows of its pictures.
-    pub fn size(&self) -> (u32, u32) {
-        self.size
+        Ok(Self { size, cpu: BandedBokeh::new(Plan::new(settings, size.0, size.1), threads) })
     }
 
     /// Blurs a picture into `out`. Both have `height * width * 3` samples, 8-bit or 16-bit sRGB, or linear light
@@ -62,11 +49,6 @@ impl SliceBlur {
         if lengths != [count * 3, count * 3, count] {
             return Err(BokehError::Lengths { size: self.size, lengths });
         }
-        let flow = self.cpu.blur_pixels(pixels, coc, out, |_| check_stop());
-        if flow.is_break() {
-            // The buffers hold parts of two frames now.
-            self.cpu = CpuBokeh::new(Plan::new(&self.settings, self.size.0, self.size.1), self.threads);
-        }
-        Ok(flow)
+        Ok(self.cpu.blur_pixels(pixels, coc, out, |_| check_stop()))
     }
 }

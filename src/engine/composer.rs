@@ -1,5 +1,6 @@
 //! Composes the subject: virtual background and auto-framing.
 
+use super::Images;
 #[cfg(feature = "files")]
 use super::backdrop_player::BackdropPlayer;
 use crate::depth::backdrop::{Background, VirtualBackground};
@@ -28,14 +29,6 @@ impl OriginalFrame {
         std::mem::swap(&mut self.color, color);
         std::mem::swap(&mut self.map, map);
     }
-}
-
-/// What is kept of a frame, over nothing: a picture and its map, to be blurred like the frame
-/// ([`VirtualBackground::draw_kept`]).
-#[derive(Default)]
-pub(crate) struct Kept {
-    pub color: ColorImage,
-    pub map: DepthMap,
 }
 
 /// How a video behind the subject is played.
@@ -93,9 +86,9 @@ impl Composer {
     }
 
     /// Draws what is kept of a frame of `size`, before it is composed.
-    pub fn draw_kept(&mut self, size: (u32, u32), map: &DepthMap, field: &CocField, kept: &mut Kept) {
+    pub fn draw_kept(&mut self, size: (u32, u32), map: &DepthMap, field: &CocField, kept: &mut Images) {
         if let (CocField::Depth(lens), Some(backdrop)) = (field, &mut self.backdrop) {
-            backdrop.draw_kept((size, map), lens, &mut kept.color, &mut kept.map);
+            backdrop.draw_kept((size, map), lens, &mut kept.color, kept.depth.get_or_insert_default());
         }
     }
 

@@ -22,7 +22,7 @@ pub mod still;
 pub(crate) use blur::TimeBudget;
 pub use blur::{Blur, Images};
 pub use coc::{CocCalculator, Postprocess};
-pub(crate) use composer::{Kept, OriginalFrame, Playback};
+pub(crate) use composer::{OriginalFrame, Playback};
 pub use frame_processor::FrameProcessor;
 pub(crate) use preprocessor::{Composed, Input, Origin, Preprocessor};
 

@@ -1,8 +1,9 @@
 //! The first half of the engine: computes CoC and matte from a frame's raw depth, then applies virtual background
 //! and auto-framing.
 
+use super::Images;
 use super::coc::{CocCalculator, Postprocess};
-use super::composer::{Composer, Kept, OriginalFrame, Playback};
+use super::composer::{Composer, OriginalFrame, Playback};
 use super::fit_check::{FitCheck, Verdict};
 use crate::bokeh::{Bokeh, BokehError};
 use crate::compute::DeviceFrame;
@@ -64,8 +65,9 @@ pub(crate) struct Composed {
     pub crop: Option<Crop>,
     /// The frame before its background was replaced, if it was and the original is kept.
     pub original: Option<Pooled<OriginalFrame>>,
-    /// What is kept of the frame, if its result has an alpha channel.
-    pub kept: Option<Pooled<Kept>>,
+    /// What is kept of the frame, over nothing, if its result has an alpha channel: to be blurred like the frame
+    /// ([`VirtualBackground::draw_kept`](crate::depth::backdrop::VirtualBackground::draw_kept)).
+    pub kept: Option<Pooled<Images>>,
     /// The device's copy of picture and depth, if the device has refined the depth.
     pub on_device: Option<Pooled<DeviceFrame>>,
 }
@@ -215,7 +217,7 @@ impl Preprocessor {
         field: &CocField,
         time_ns: u64,
         originals: Option<&Pool<OriginalFrame>>,
-        kept_parts: impl FnOnce() -> Pooled<Kept>,
+        kept_parts: impl FnOnce() -> Pooled<Images>,
     ) -> Composed {
         let replaces = self.composer.replaces_background(field);
         let original = originals.filter(|_| replaces).map(|pool| {
@@ -248,7 +250,7 @@ impl Preprocessor {
         }
         let map = map.ok_or(BokehError::NoDepth)?;
         let field = self.compute_coc(map, color, time_ns);
-        let composed = self.compose(color, map, &field, time_ns, None, || Pooled::detached(Kept::default()));
+        let composed = self.compose(color, map, &field, time_ns, None, || Pooled::detached(Images::default()));
         Ok((field, composed))
     }
 }

@@ -1,7 +1,6 @@
 //! Third stage: drops frames that are too late and blurs the rest; swaps the executor when a frame brings another.
 
 use std::collections::VecDeque;
-use std::mem;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -10,10 +9,9 @@ use super::depth::Prepared;
 use super::frame::Frame;
 use super::output_request::OutputRequest;
 use super::{Fault, MAX_IN_FLIGHT, Shared, StageResult};
-use crate::bokeh::{BlurredFrame, Job, PassTimes, Picture};
-use crate::budget::Quality;
+use crate::bokeh::{BlurredFrame, BokehError, Job, PassTimes, Picture};
 use crate::compute::PictureLocation;
-use crate::engine::{Blur, Composed, Kept, OriginalFrame};
+use crate::engine::{Blur, Composed, Images, OriginalFrame};
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -31,7 +29,7 @@ pub(super) struct Blurred {
     /// The crop that goes out; `None` is the whole picture.
     pub crop: Option<Crop>,
     /// What is kept of the picture, blurred like it, if its background is transparent.
-    pub kept: Option<Pooled<ColorImage>>,
+    pub kept: Option<Pooled<Images>>,
 }
 
 pub(super) struct Stage<'a> {
@@ -54,7 +52,7 @@ struct InFlight {
     crop: Option<Crop>,
     original: Option<Pooled<OriginalFrame>>,
     /// What is kept of it, blurred, and how long that took.
-    kept: Option<(Pooled<ColorImage>, u64)>,
+    kept: Option<(Pooled<Images>, u64)>,
 }
 
 type From = Receiver<Frame<Prepared>>;
@@ -142,25 +140,11 @@ impl<'a> Stage<'a> {
         Ok(true)
     }
 
-    /// Blurs what is kept of a frame, while no frame is in flight; returns it with the time it took, in nanoseconds.
-    fn blur_kept(
-        &mut self,
-        mut kept: Pooled<Kept>,
-        coc: CocField,
-        (ticket, quality): (u64, Quality),
-    ) -> Result<(Pooled<ColorImage>, u64), Fault> {
-        let Shared { clock, pools, .. } = self.shared;
-        let began_ns = clock.now_ns();
-        let Kept { color, map } = mem::take(&mut *kept);
-        let mut out = pools.kept_outs.take();
-        out.resize(color.width, color.height);
-        let job = Job::new(Pooled::detached(color), Some(Pooled::detached(map)), coc);
-        self.blur.submit(Job { ticket, quality, out, ..job })?;
-        let BlurredFrame { picture, mut color, depth, .. } = self.blur.collect(true)?.ok_or(Fault::LostFrame)?;
-        // Their memory serves a later frame.
-        *kept =
-            Kept { color: mem::take(&mut *color), map: depth.map(|mut map| mem::take(&mut *map)).unwrap_or_default() };
-        Ok((picture.into_memory().ok_or(Fault::LostFrame)?, clock.now_ns() - began_ns))
+    /// Blurs what is kept of a frame, while no frame is in flight; returns the time it took, in nanoseconds.
+    fn blur_kept(&mut self, kept: &mut Images, coc: CocField) -> Result<u64, BokehError> {
+        let began_ns = self.shared.clock.now_ns();
+        self.blur.blur(kept, coc)?;
+        Ok(self.shared.clock.now_ns() - began_ns)
     }
 
     /// Forwards a frame unblurred, unless it is late; returns whether the output is still open.
@@ -197,11 +181,12 @@ impl<'a> Stage<'a> {
         // A crop is cut out of the full-colour picture, so YUYV is of no use then.
         let is_yuyv = crop.is_none() && wants_yuyv.load(Ordering::Relaxed);
         let (ticket, quality) = (frame.ticket.id.0, frame.trace.quality.unwrap_or_default());
-        let kept = match kept.map(|kept| self.blur_kept(kept, coc, (ticket, quality))).transpose() {
+        let kept = kept.map(|mut kept| self.blur_kept(&mut kept, coc).map(|took_ns| (kept, took_ns))).transpose();
+        let kept = match kept {
             Ok(kept) => kept,
             Err(error) => {
                 counter.count_dropped(frame.ticket, DropCause::Failed);
-                return Err(error);
+                return Err(error.into());
             }
         };
         let (out, yuyv) = (pools.outs.take(), is_yuyv.then(|| pools.yuyvs.take()));

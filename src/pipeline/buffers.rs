@@ -2,7 +2,7 @@
 
 use crate::bokeh::{BokehError, Settings};
 use crate::capture::FrameData;
-use crate::engine::{Kept, OriginalFrame};
+use crate::engine::{Images, OriginalFrame};
 use crate::frame::{ColorImage, DepthMap, GrayImage, YuyvImage};
 use crate::link::LOSSLESS_ITEMS;
 use crate::link::pool::Pool;
@@ -15,10 +15,8 @@ pub(super) struct Pools {
     pub rights: Pool<GrayImage>,
     /// Frames before their background was replaced.
     pub original: Pool<OriginalFrame>,
-    /// What is kept of frames before a transparent background.
-    pub kept: Pool<Kept>,
-    /// The same, blurred.
-    pub kept_outs: Pool<ColorImage>,
+    /// What is kept of frames before a transparent background, and the same blurred.
+    pub kept: Pool<Images>,
     /// Blurred pictures.
     pub outs: Pool<ColorImage>,
     pub yuyvs: Pool<YuyvImage>,
@@ -36,9 +34,8 @@ impl Pools {
                 GrayImage::default,
             ),
             original: Pool::new(counts.original_buffers(), OriginalFrame::default),
-            kept: Pool::new(counts.original_buffers(), Kept::default),
-            // Empty until a background is transparent.
-            kept_outs: Pool::new(counts.output_buffers(), ColorImage::default),
+            // Empty until a background is transparent; from the replacement of the background to the last stage.
+            kept: Pool::new(counts.original_buffers() + counts.output_buffers(), Images::default),
             outs: Pool::new(counts.output_buffers(), picture),
             yuyvs: Pool::new(counts.output_buffers(), YuyvImage::default),
         }

@@ -163,12 +163,16 @@ impl<'a> Stage<'a> {
         let whole = crop.zip(picture.memory());
         let is_cropped = whole.map(|(crop, whole)| self.cropper.crop(whole, &crop, &mut self.cropped)).is_some();
         if let Some((crop, kept)) = crop.zip(kept.as_deref()) {
-            self.cropper.crop(kept, &crop, &mut self.cropped_kept);
+            self.cropper.crop(&kept.blurred, &crop, &mut self.cropped_kept);
         }
         if self.mirror {
             let out = if is_cropped { Some(&mut self.cropped) } else { picture.memory_mut() };
             out.map(mirror_picture);
-            let kept = if is_cropped { Some(&mut self.cropped_kept) } else { kept.as_deref_mut() };
+            let kept = if is_cropped {
+                Some(&mut self.cropped_kept)
+            } else {
+                kept.as_deref_mut().map(|kept| &mut kept.blurred)
+            };
             kept.map(mirror_picture);
         }
         is_cropped
@@ -180,7 +184,7 @@ impl<'a> Stage<'a> {
         let Some(kept) = kept.as_deref().filter(|_| self.sink.keeps_alpha()) else { return false };
         let (out, kept) = match is_cropped {
             true => (Some(&mut self.cropped), &self.cropped_kept),
-            false => (picture.memory_mut(), kept),
+            false => (picture.memory_mut(), &kept.blurred),
         };
         out.map(|out| self.cut_out.unpremultiply(out, kept)).is_some()
     }

@@ -1,9 +1,12 @@
 //! Large pictures are blurred in bands of rows: their seams are invisible.
 #![allow(missing_docs)]
 
+use std::ops::ControlFlow;
+
 use bokehcam::bokeh::aperture::{Aperture, Shape};
-use bokehcam::bokeh::cpu::{BandedBokeh, CpuBokeh};
+use bokehcam::bokeh::cpu::BandedBokeh;
 use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::slices::{Radii, Sample};
 use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
@@ -13,11 +16,18 @@ use crate::common::{COC_KINDS, DOF, coc, codes_apart, depth, noise, settings, th
 
 /// Blurs a picture as a whole, and in bands of 256 rows.
 fn both(settings: &Settings, color: &ColorImage, map: &DepthMap, field: &CocField) -> [ColorImage; 2] {
-    let plan = || Plan::new(settings, color.width, color.height);
-    let [mut whole, mut banded] = [ColorImage::default(), ColorImage::default()];
-    CpuBokeh::new(plan(), Some(2)).blur(color, Some(map), field, &mut whole).unwrap();
-    BandedBokeh::with_rows(plan(), Some(2), 256).blur(color, Some(map), field, &mut banded).unwrap();
-    [whole, banded]
+    both_of(settings, color.size(), &color.rgb, Radii::Field(field, Some(map)))
+        .map(|rgb| ColorImage { rgb, ..color.clone() })
+}
+
+/// Blurs pixels of any type as a whole, and in bands of 256 rows.
+fn both_of<T: Sample>(settings: &Settings, size: (u32, u32), pixels: &[T], coc: Radii<'_>) -> [Vec<T>; 2] {
+    let plan = || Plan::new(settings, size.0, size.1);
+    [BandedBokeh::new(plan(), Some(2)), BandedBokeh::with_rows(plan(), Some(2), 256)].map(|mut executor| {
+        let mut out = vec![T::default(); pixels.len()];
+        assert!(executor.blur_pixels(pixels, coc, &mut out, |_| ControlFlow::Continue(())).is_continue());
+        out
+    })
 }
 
 /// Returns a subject in focus before a wall, along all rows.
@@ -49,6 +59,33 @@ fn bands_are_the_whole_picture_to_the_bit() {
         let [whole, banded] = both(&gather, &color, &map, &DOF);
         assert!(whole == banded, "gather, {rank:?}: {}", codes_apart(&whole, &banded));
     }
+}
+
+#[test]
+fn bands_of_any_samples_by_given_radii_are_the_whole_picture_to_the_bit() {
+    let size = (72, 1700);
+    let (color, map) = (noise(size.0, size.1), subject(size.0, size.1));
+    let CocField::Depth(lens) = DOF else { unreachable!() };
+    let radii: Vec<f32> = map.metres.iter().map(|&metres| lens.coc_px(metres)).collect();
+    let codes: Vec<u16> = color.rgb.iter().map(|&code| u16::from(code) * 257).collect();
+    let light: Vec<f32> = color.rgb.iter().map(|&code| f32::from(code) / 255.0).collect();
+    let settings = settings(CocKind::Depth);
+    let [whole, banded] = both_of(&settings, size, &codes, Radii::Each(&radii));
+    assert!(whole == banded && whole != codes, "16 bits");
+    let [whole, banded] = both_of(&settings, size, &light, Radii::Each(&radii));
+    assert!(whole == banded && whole != light, "linear light");
+}
+
+#[test]
+fn bands_are_left_out_once_the_picture_is_stopped() {
+    let (color, map) = (noise(72, 1700), subject(72, 1700));
+    let mut executor = BandedBokeh::with_rows(Plan::new(&settings(CocKind::Depth), 72, 1700), Some(2), 256);
+    let (mut out, mut passes) = (vec![0; color.rgb.len()], 0);
+    let flow = executor.blur_pixels(&color.rgb, Radii::Field(&DOF, Some(&map)), &mut out, |_| {
+        passes += 1;
+        ControlFlow::Break(())
+    });
+    assert!(flow.is_break() && passes == 1);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::cpu::BandedBokeh;
 use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
@@ -25,7 +25,7 @@ fn yuyv_is_the_picture_encoded() {
         let field = coc(CocKind::Depth, height);
         let plan = Plan::new(&settings(CocKind::Depth), width, height);
         let mut gpu = GpuBokeh::new(&plan, false, None).expect("a Vulkan adapter, software included");
-        let mut cpu = CpuBokeh::new(plan, Some(1));
+        let mut cpu = BandedBokeh::new(plan, Some(1));
         let (image, map) = (noise(width, height), three_depths(width, height));
         let job = |place, yuyv: bool| Job {
             place,

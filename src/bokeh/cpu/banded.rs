@@ -1,25 +1,22 @@
-//! Blurs a large picture in bands of rows, one after the other: the memory for bins is then that of a band.
+//! Blurs a picture as a whole, or a large one in bands of rows, one after the other: the memory for bins is then that of
+//! a band.
 //!
 //! Each band is blurred with the rows around it that can change its result ([`Plan::support_rows`]), and with the bins of
 //! the whole picture. The result is the same to the bit, unless hidden background is inpainted: from the whole picture
 //! then, and from a band with many rows around it here.
 
+use std::borrow::Cow;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
-use std::time::Instant;
-
-use pulp::Arch;
 
 use super::encode::Encoder;
-use super::frames::{check_frame, create_encoder, describe};
 use super::unpack::nearest_sample;
 use super::{CpuBokeh, Radii, Sample};
+use crate::bokeh::BlurredFrame;
 use crate::bokeh::plan::Plan;
-use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
-use crate::color::Picture16;
-use crate::compute::Backend;
+use crate::budget::Quality;
 use crate::compute::thread_pool::core_count;
-use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel, resize_buffer};
+use crate::frame::{DepthMap, Matte, MixedPixel, resize_buffer};
 use crate::optics::CocField;
 
 /// Pictures of more pixels are blurred in bands.
@@ -30,91 +27,102 @@ const BAND_PIXELS: usize = 8 << 20;
 /// of the inpainting's pyramid.
 const ROW_MULTIPLE: usize = 256;
 
-/// Runs a plan on the CPU, band by band.
+/// Runs a plan on the CPU, for pictures of any size: as a whole, or band by band.
 pub struct BandedBokeh {
     /// The plan of whole pictures.
-    plan: Plan,
+    pub(super) plan: Plan,
     threads: usize,
-    /// Rows of a band, without those around it: a multiple of [`ROW_MULTIPLE`].
-    rows: usize,
+    /// Rows of a band, without those around it: a multiple of [`ROW_MULTIPLE`]. `None` blurs the whole at once.
+    rows: Option<usize>,
+    /// Blurs whole pictures; bands have one of their own.
+    whole: Option<CpuBokeh>,
+    /// Encodes results, if not as 8-bit sRGB.
+    pub(super) encoder: Option<Arc<Encoder>>,
     /// The last frame, until it is collected.
-    done: Option<BlurredFrame>,
+    pub(super) done: Option<BlurredFrame>,
 }
 
 /// The circle of confusion of a band, as [`Radii`].
-enum BandRadii {
+enum BandRadii<'a> {
     Uniform(CocField),
-    Each(Vec<f32>),
+    Each(Cow<'a, [f32]>),
     Depth(CocField, Box<DepthMap>),
 }
 
 impl BandedBokeh {
-    /// Creates an executor of `plan` on `threads` threads (all cores when `None`).
+    /// Creates an executor of `plan` on `threads` threads (all cores when `None`): in bands of rows for large pictures.
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
-        let rows = BAND_PIXELS / plan.width.max(1);
-        Self::with_rows(plan, threads, rows)
+        let threads = threads.unwrap_or_else(core_count);
+        if plan.width * plan.height > MAX_WHOLE_PIXELS {
+            let rows = BAND_PIXELS / plan.width.max(1);
+            return Self::with_rows(plan, Some(threads), rows);
+        }
+        let whole = Some(CpuBokeh::new(plan.clone(), Some(threads)));
+        Self { plan, threads, rows: None, whole, encoder: None, done: None }
     }
 
     /// Creates an executor with bands of about `rows` rows.
     #[doc(hidden)]
     pub fn with_rows(plan: Plan, threads: Option<usize>, rows: usize) -> Self {
         let threads = threads.unwrap_or_else(core_count);
-        let rows = rows.next_multiple_of(ROW_MULTIPLE).max(ROW_MULTIPLE);
-        Self { plan, threads, rows, done: None }
+        let rows = Some(rows.next_multiple_of(ROW_MULTIPLE).max(ROW_MULTIPLE));
+        Self { plan, threads, rows, whole: None, encoder: None, done: None }
     }
 
-    /// Blurs one picture.
-    ///
-    /// # Errors
-    /// The picture and the plan have different sizes, or `coc` needs depth and the frame has none.
-    pub fn blur(
+    /// Returns the number of threads: fewer than requested if the system refused some.
+    pub(super) fn thread_count(&self) -> usize {
+        self.whole.as_ref().map_or(self.threads, |whole| whole.workers.thread_count())
+    }
+
+    /// Returns which fraction of the last frame was kept from earlier ones, 0 to 1.
+    pub(super) fn kept_fraction(&self) -> f32 {
+        self.whole.as_ref().map_or(0.0, CpuBokeh::kept_fraction)
+    }
+
+    /// Changes the quality of the next frames, if the plan has other levels.
+    pub(super) fn set_quality(&mut self, quality: Quality) {
+        self.plan.set_quality(quality);
+        self.whole.iter_mut().for_each(|whole| whole.set_quality(quality));
+    }
+
+    /// Blurs the `pixels` of one picture into `out`, which has the same length. Calls `lap` with the name of each pass
+    /// after it; `lap` may stop the frame, which leaves `out` unspecified.
+    #[doc(hidden)]
+    pub fn blur_pixels<T: Sample>(
         &mut self,
-        color: &ColorImage,
-        depth: Option<&DepthMap>,
-        coc: &CocField,
-        out: &mut ColorImage,
-    ) -> Result<PassTimes, BokehError> {
-        check_frame(&self.plan, color.size(), depth, coc)?;
-        out.resize(color.width, color.height);
-        Ok(self.blur_bands((&color.rgb, &mut out.rgb), depth, coc, None))
+        pixels: &[T],
+        coc: Radii<'_>,
+        out: &mut [T],
+        lap: impl FnMut(&'static str) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        if let Some(rows) = self.rows {
+            return self.blur_bands(rows, (pixels, out), coc, lap);
+        }
+        let whole = self.whole.get_or_insert_with(|| CpuBokeh::new(self.plan.clone(), Some(self.threads)));
+        if let Some(encoder) = &self.encoder {
+            whole.encoder = Arc::clone(encoder);
+        }
+        let flow = whole.blur_pixels(pixels, coc, out, lap);
+        if flow.is_break() {
+            // Its buffers hold parts of two frames now.
+            self.whole = None;
+        }
+        flow
     }
 
-    /// Blurs one picture of 16-bit codes in linear light of its tone curves.
-    ///
-    /// # Errors
-    /// The same as for [`BandedBokeh::blur`].
-    pub fn blur_16bit(
-        &mut self,
-        picture: &Picture16,
-        depth: Option<&DepthMap>,
-        coc: &CocField,
-    ) -> Result<Picture16, BokehError> {
-        check_frame(&self.plan, picture.size(), depth, coc)?;
-        let mut out = Picture16::new(picture.size(), picture.curves.clone());
-        self.blur_bands((&picture.rgb, &mut out.rgb), depth, coc, Some(create_encoder(picture)));
-        Ok(out)
-    }
-
-    /// Blurs the pixels of one picture into others, with the results' encoder if it is not that of 8-bit sRGB.
+    /// Blurs the pixels of one picture into others, in bands of `rows` rows.
     fn blur_bands<T: Sample>(
         &mut self,
+        rows: usize,
         (from, into): (&[T], &mut [T]),
-        depth: Option<&DepthMap>,
-        coc: &CocField,
-        encoder: Option<Arc<Encoder>>,
-    ) -> PassTimes {
+        coc: Radii<'_>,
+        mut lap: impl FnMut(&'static str) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let (width, height) = (self.plan.width, self.plan.height);
-        self.plan.split_by_depth(depth, coc);
-        let (mut times, mut clock) = (PassTimes::new(), Instant::now());
-        let mut lap = |name| {
-            let now = Instant::now();
-            times.add(name, now - clock);
-            clock = now;
-            ControlFlow::Continue(())
-        };
+        coc.split(&mut self.plan);
         let mut executor: Option<CpuBokeh> = None;
         let mut result = Vec::new();
-        for (rows, around) in split_into_bands(height, self.rows, self.plan.support_rows()) {
+        for (rows, around) in split_into_bands(height, rows, self.plan.support_rows()) {
             let wanted = rows.start - around.start..rows.end - around.start;
             let plan = self.plan.for_band(around.len(), wanted.clone());
             // Bands are as high as others but for the last one, and share an executor.
@@ -129,18 +137,18 @@ impl BandedBokeh {
                     executor.insert(CpuBokeh::new(plan, Some(self.threads)))
                 }
             };
-            let radii = self.plan.band_radii(depth, coc, around.clone());
+            let radii = self.plan.band_radii(coc, around.clone());
             // New memory takes pages only for the rows that are written.
             resize_buffer(&mut result, around.len() * width * 3);
-            if let Some(encoder) = &encoder {
+            if let Some(encoder) = &self.encoder {
                 executor.encoder = Arc::clone(encoder);
             }
             let pixels = &from[around.start * width * 3..around.end * width * 3];
-            let _never_stopped = executor.blur_pixels(pixels, radii.as_radii(), &mut result, &mut lap);
+            executor.blur_pixels(pixels, radii.as_radii(), &mut result, &mut lap)?;
             into[rows.start * width * 3..rows.end * width * 3]
                 .copy_from_slice(&result[wanted.start * width * 3..wanted.end * width * 3]);
         }
-        times
+        ControlFlow::Continue(())
     }
 }
 
@@ -159,7 +167,7 @@ fn split_into_bands(height: usize, rows: usize, support: usize) -> impl Iterator
     })
 }
 
-impl BandRadii {
+impl BandRadii<'_> {
     fn as_radii(&self) -> Radii<'_> {
         match self {
             Self::Uniform(field) => Radii::Field(field, None),
@@ -171,14 +179,15 @@ impl BandRadii {
 
 impl Plan {
     /// Returns the CoC of some rows of the picture.
-    fn band_radii(&self, depth: Option<&DepthMap>, coc: &CocField, rows: Range<usize>) -> BandRadii {
+    fn band_radii<'a>(&self, coc: Radii<'a>, rows: Range<usize>) -> BandRadii<'a> {
         let (width, height) = (self.width, self.height);
-        match (coc, depth) {
-            (CocField::Ramp(ramp), _) => {
+        match coc {
+            Radii::Each(coc_px) => BandRadii::Each(Cow::Borrowed(&coc_px[rows.start * width..rows.end * width])),
+            Radii::Field(CocField::Ramp(ramp), _) => {
                 let row = |y| (0..width).map(move |x| ramp.coc_px(x as f32, y as f32));
                 BandRadii::Each(rows.flat_map(row).collect())
             }
-            (CocField::Depth(_), Some(map)) if !map.metres.is_empty() => {
+            Radii::Field(coc @ CocField::Depth(_), Some(map)) if !map.metres.is_empty() => {
                 let columns = map.width as usize;
                 let mut band = DepthMap::default();
                 band.resize(map.width, rows.len() as u32);
@@ -187,7 +196,7 @@ impl Plan {
                     out.copy_from_slice(&map.metres[from * columns..][..columns]);
                 }
                 (band.subject_m, band.is_smooth) = (map.subject_m, map.is_smooth);
-                if let Some(matte) = self.matte(depth, coc) {
+                if let Some(matte) = self.matte(Some(map), coc) {
                     let first = (rows.start * width) as u32;
                     let pixels = matte.pixels_in(rows.start * width..rows.end * width);
                     let moved = pixels.iter().map(|pixel| MixedPixel { at: pixel.at - first, ..*pixel });
@@ -195,45 +204,28 @@ impl Plan {
                 }
                 BandRadii::Depth(*coc, Box::new(band))
             }
-            _ => BandRadii::Uniform(*coc),
+            Radii::Field(coc, _) => BandRadii::Uniform(*coc),
         }
-    }
-}
-
-impl Bokeh for BandedBokeh {
-    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        self.plan.set_quality(job.quality);
-        let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
-        let Job { ticket, color, depth, out, .. } = job;
-        let picture = Picture::from_memory(out);
-        self.done = Some(BlurredFrame { ticket, picture, color, depth, times, reused: 0.0 });
-        Ok(())
-    }
-
-    fn collect(&mut self, _wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
-        Ok(self.done.take())
-    }
-
-    fn in_flight(&self) -> usize {
-        usize::from(self.done.is_some())
-    }
-
-    fn capacity(&self) -> usize {
-        1
-    }
-
-    fn backend(&self) -> Backend {
-        Backend::Cpu
-    }
-
-    fn describe(&self) -> String {
-        describe(self.threads, Arch::new())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bokeh::Settings;
+    use crate::look::{Effect, Look};
+
+    #[test]
+    fn only_large_pictures_are_blurred_in_bands() {
+        let settings = Look::with_effect(Effect::Blur).blur_settings((64, 64), false).expect("it blurs");
+        let is_whole = |settings: &Settings, height| {
+            let executor = BandedBokeh::new(Plan::new(settings, 64, height), Some(1));
+            (executor.rows.is_none(), executor.whole.is_some())
+        };
+        let limit = (MAX_WHOLE_PIXELS / 64) as u32;
+        assert_eq!(is_whole(&settings, 64), (true, true));
+        assert_eq!(is_whole(&settings, limit + 1), (false, false));
+    }
 
     #[test]
     fn bands_are_all_rows_once_and_have_the_rows_around_them() {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use pulp::Arch;
 
 use super::encode::{EncodeTable, Encoder};
-use super::{CpuBokeh, Radii, Sample};
+use super::{BandedBokeh, CpuBokeh, Radii};
 use crate::bokeh::plan::Plan;
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::color::Picture16;
@@ -29,9 +29,11 @@ impl CpuBokeh {
     ) -> Result<PassTimes, BokehError> {
         check_frame(&self.plan, color.size(), depth, coc)?;
         out.resize(color.width, color.height);
-        Ok(self.blur_timed(&color.rgb, Radii::Field(coc, depth), &mut out.rgb))
+        Ok(time_passes(|lap| self.blur_pixels(&color.rgb, Radii::Field(coc, depth), &mut out.rgb, lap)))
     }
+}
 
+impl BandedBokeh {
     /// Blurs one picture of 16-bit codes in linear light of its tone curves.
     ///
     /// # Errors
@@ -43,32 +45,35 @@ impl CpuBokeh {
         coc: &CocField,
     ) -> Result<Picture16, BokehError> {
         check_frame(&self.plan, picture.size(), depth, coc)?;
-        self.encoder = create_encoder(picture);
+        self.encoder = Some(Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) }));
         let mut out = Picture16::new(picture.size(), picture.curves.clone());
-        self.blur_timed(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb);
+        time_passes(|lap| self.blur_pixels(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb, lap));
         Ok(out)
-    }
-
-    fn blur_timed<T: Sample>(&mut self, pixels: &[T], coc: Radii<'_>, out: &mut [T]) -> PassTimes {
-        let mut times = PassTimes::new();
-        let mut clock = Instant::now();
-        let lap = |name| {
-            let now = Instant::now();
-            times.add(name, now - clock);
-            clock = now;
-            ControlFlow::Continue(())
-        };
-        let _never_stopped = self.blur_pixels(pixels, coc, out, lap);
-        times
     }
 }
 
-impl Bokeh for CpuBokeh {
-    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        self.plan.set_quality(job.quality);
-        let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
-        let Job { ticket, color, depth, out, .. } = job;
-        let reused = self.kept_fraction;
+/// Runs the passes of a frame, which is never stopped; returns their times.
+fn time_passes(run: impl FnOnce(&mut dyn FnMut(&'static str) -> ControlFlow<()>) -> ControlFlow<()>) -> PassTimes {
+    let mut times = PassTimes::new();
+    let mut clock = Instant::now();
+    let _never_stopped = run(&mut |name| {
+        let now = Instant::now();
+        times.add(name, now - clock);
+        clock = now;
+        ControlFlow::Continue(())
+    });
+    times
+}
+
+impl Bokeh for BandedBokeh {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        let Job { ticket, color, depth, coc, quality, mut out, .. } = job;
+        check_frame(&self.plan, color.size(), depth.as_deref(), &coc)?;
+        self.set_quality(quality);
+        out.resize(color.width, color.height);
+        let radii = Radii::Field(&coc, depth.as_deref());
+        let times = time_passes(|lap| self.blur_pixels(&color.rgb, radii, &mut out.rgb, lap));
+        let reused = self.kept_fraction();
         self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times, reused });
         Ok(())
     }
@@ -90,17 +95,12 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        describe(self.workers.thread_count(), self.arch)
+        format!("cpu, {} threads, {}", self.thread_count(), simd::instruction_set(Arch::new()))
     }
 }
 
 /// Refuses a picture of another size than the plan's, and one without the depth that `coc` needs.
-pub(super) fn check_frame(
-    plan: &Plan,
-    got: (u32, u32),
-    depth: Option<&DepthMap>,
-    coc: &CocField,
-) -> Result<(), BokehError> {
+fn check_frame(plan: &Plan, got: (u32, u32), depth: Option<&DepthMap>, coc: &CocField) -> Result<(), BokehError> {
     let made_for = (plan.width as u32, plan.height as u32);
     if got != made_for {
         return Err(BokehError::Size { made_for, got });
@@ -109,14 +109,4 @@ pub(super) fn check_frame(
         (CocField::Depth(_), None) => Err(BokehError::NoDepth),
         _ => Ok(()),
     }
-}
-
-/// Creates the encoder for results of `picture`.
-pub(super) fn create_encoder(picture: &Picture16) -> Arc<Encoder> {
-    Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) })
-}
-
-/// Describes the executor in one line.
-pub(super) fn describe(threads: usize, arch: Arch) -> String {
-    format!("cpu, {threads} threads, {}", simd::instruction_set(arch))
 }

@@ -46,12 +46,8 @@ use unpack::InputFrame;
 use super::ladder::Compositing;
 use super::plan::{CELL, Plan};
 use super::reuse::CONTENT_BIN_W;
-use super::{BlurredFrame, Bokeh, BokehError};
 use crate::budget::Quality;
-use crate::color::Picture16;
 use crate::compute::thread_pool::{ThreadPool, core_count};
-use crate::frame::DepthMap;
-use crate::optics::CocField;
 
 pub use banded::{BandedBokeh, MAX_WHOLE_PIXELS};
 pub use pixels::{Pixels, Radii, Sample};
@@ -59,7 +55,7 @@ pub use pixels::{Pixels, Radii, Sample};
 // Content is kept in whole strips.
 const _: () = assert!(CONTENT_BIN_W == rows::STRIP);
 
-/// Runs a plan on the CPU.
+/// Runs a plan on the CPU, with buffers for the whole of it; [`BandedBokeh`] has one for the picture or for a band.
 pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
@@ -76,38 +72,8 @@ pub struct CpuBokeh {
     thread_scratch: Vec<ThreadScratch>,
     /// Flags for [`DisjointParts`]: one per part of the largest pass.
     taken: Vec<AtomicBool>,
-    /// The last frame, until it is collected.
-    done: Option<BlurredFrame>,
     /// Fraction of the last frame that was kept from earlier ones.
     kept_fraction: f32,
-}
-
-/// Creates an executor of `plan` on `threads` threads (all cores when `None`): in bands of rows for large pictures.
-pub fn create(plan: Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
-    match plan.width * plan.height > MAX_WHOLE_PIXELS {
-        true => Box::new(BandedBokeh::new(plan, threads)),
-        false => Box::new(CpuBokeh::new(plan, threads)),
-    }
-}
-
-/// Blurs one picture of 16-bit codes in linear light of its tone curves, in bands of rows if it is large; returns it with
-/// a description of the executor.
-///
-/// # Errors
-/// The picture and the plan have different sizes, or `coc` needs depth and it is missing.
-pub fn blur_16bit(
-    plan: Plan,
-    threads: Option<usize>,
-    picture: &Picture16,
-    depth: Option<&DepthMap>,
-    coc: &CocField,
-) -> Result<(Picture16, String), BokehError> {
-    if plan.width * plan.height > banded::MAX_WHOLE_PIXELS {
-        let mut executor = BandedBokeh::new(plan, threads);
-        return Ok((executor.blur_16bit(picture, depth, coc)?, executor.describe()));
-    }
-    let mut executor = CpuBokeh::new(plan, threads);
-    Ok((executor.blur_16bit(picture, depth, coc)?, executor.describe()))
 }
 
 /// Scratch memory of one thread.
@@ -153,7 +119,6 @@ impl CpuBokeh {
             gather,
             held: Held::new(&plan),
             thread_scratch,
-            done: None,
             kept_fraction: 0.0,
             plan,
         }
@@ -166,7 +131,7 @@ impl CpuBokeh {
 
     /// Blurs the `pixels` of one picture into `out`, which has the same length. Calls `lap` with the name of each pass
     /// after it; `lap` may stop the frame, which leaves the buffers in an unusable state.
-    pub(super) fn blur_pixels<T: Sample>(
+    fn blur_pixels<T: Sample>(
         &mut self,
         pixels: &[T],
         coc: Radii<'_>,

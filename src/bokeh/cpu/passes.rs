@@ -9,7 +9,7 @@ use super::blur::Strip;
 use super::composite::Composite;
 use super::held::HeldRows;
 use super::marking::MarkSilhouettes;
-use super::pixels::{Radii, Sample};
+use super::pixels::Sample;
 use super::reach::DilateRadii;
 use super::tiles::{BLOCK, ComputeTileRanges, TILE_H};
 use super::unpack::InputFrame;
@@ -38,10 +38,7 @@ impl CpuBokeh {
                 self.tiles.down + 1,
                 &|thread: &mut ThreadScratch, part| {
                     let Some(row) = part.checked_sub(1) else {
-                        return match frame.coc {
-                            Radii::Field(field, depth) => plan.part(0)[0].split_by_depth(depth, field),
-                            Radii::Each(coc_px) => plan.part(0)[0].split_by_radii(coc_px),
-                        };
+                        return frame.coc.split(&mut plan.part(0)[0]);
                     };
                     let ranges = ranges.part(row);
                     arch.dispatch(ComputeTileRanges { source: frame, row, ranges: &mut *ranges, coc: &mut thread.coc });

@@ -1,6 +1,7 @@
 //! Sample types of pictures in memory, and their circles of confusion.
 
 use super::encode::{CHUNK, Encoder};
+use crate::bokeh::plan::Plan;
 use crate::color::ToneCurves;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
@@ -36,6 +37,16 @@ pub enum Radii<'a> {
     Field(&'a CocField, Option<&'a DepthMap>),
     /// Given per pixel, row-major; finite.
     Each(&'a [f32]),
+}
+
+impl Radii<'_> {
+    /// Splits them into the bins of `plan`.
+    pub(super) fn split(self, plan: &mut Plan) {
+        match self {
+            Self::Field(field, depth) => plan.split_by_depth(depth, field),
+            Self::Each(coc_px) => plan.split_by_radii(coc_px),
+        }
+    }
 }
 
 /// Type of a colour sample.

@@ -233,7 +233,8 @@ fn measure_blur(
         ));
     };
     let mut color = color.clone();
-    let (coc, depth) = compute_coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
+    let measured = Depth::Measured(depth.clone());
+    let (coc, depth) = compute_coc_and_depth(&look, &mut color, Some(measured), computing.threads)?;
     // One frame at a time: the latency is measured, not the throughput.
     let mut bokeh = computing.create_blur(&settings, size)?;
     let buffers = Buffers {

@@ -49,6 +49,31 @@ fn write_mask(home: &Home) {
 const MASKED: [&str; 6] = ["--mask", "mask.png", "--refine", "off", "--blur", "6"];
 
 #[test]
+fn sixteen_bits_take_as_many_threads_as_the_option_says() {
+    let home = Home::new();
+    let (width, height) = (1600, 1200);
+    let picture = Wide::from_fn(width, height, |x, y| Rgb([30 * x as u16, 40 * y as u16, ((x * y) % 50_000) as u16]));
+    write_photo(&home, &picture, true, None);
+    let depth = |x: u32, y: u32| if (x / 100 + y / 100).is_multiple_of(2) { 5000_u16 } else { 15_000 };
+    ImageBuffer::from_fn(width, height, |x, y| image::Luma([depth(x, y)])).save(home.path("depth.png")).unwrap();
+    let args = ["render", "in.png", "--depth-map", "depth.png", "--refine", "on", "--out", "out.png"];
+    let mut command = home.command(&[&args[..], &["--backend", "cpu", "--threads", "1", "-q"]].concat());
+    let mut child = command.spawn().unwrap();
+    let mut threads = BTreeSet::new();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        let tasks = fs::read_dir(format!("/proc/{}/task", child.id())).into_iter().flatten().flatten();
+        threads.extend(tasks.filter_map(|task| fs::read_to_string(task.path().join("comm")).ok()));
+    };
+    assert!(status.success() && !threads.is_empty());
+    let others: Vec<_> =
+        threads.iter().filter(|name| ["blur-", "depth-"].iter().any(|pool| name.starts_with(pool))).collect();
+    assert!(others.is_empty(), "beside the only thread: {others:?}");
+}
+
+#[test]
 fn sixteen_bits_stay_sixteen_bits() {
     let home = Home::new();
     write_mask(&home);

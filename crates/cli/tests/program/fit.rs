@@ -86,7 +86,7 @@ fn it_is_seen_how_outlines_lie() {
 /// Returns the mean absolute error of the CoC radius, in pixels.
 fn coc_error_px(refine: Refine, color: &ColorImage, map: DepthMap, truth: &DepthMap) -> f32 {
     let look = Look { refine, focus: "1.2".parse().unwrap(), ..Look::default() };
-    let (field, map) = compute_coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map))).unwrap();
+    let (field, map) = compute_coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map)), None).unwrap();
     let map = map.unwrap();
     let bokehcam::optics::CocField::Depth(lens) = field else { panic!("the blur follows depth") };
     let step = truth.width / map.width;

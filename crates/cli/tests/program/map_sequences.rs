@@ -179,7 +179,7 @@ fn a_focus_without_metres_is_a_place_and_refocusing_keeps_the_lens() {
         let look = Look { focus: focus.parse().unwrap(), strength: Strength::AtInfinity(8.0), ..Look::default() };
         let look = look.for_source(SourceDepth { has_depth: true, is_relative: true, size: (width, height) });
         let measured = still::Depth::Measured(map.clone());
-        let (field, map) = still::compute_coc_and_depth(&look, &mut checks.clone(), Some(measured)).unwrap();
+        let (field, map) = still::compute_coc_and_depth(&look, &mut checks.clone(), Some(measured), Some(1)).unwrap();
         let CocField::Depth(lens) = field else { panic!("{field:?}") };
         let radii_px = map.unwrap().metres.into_iter().map(|metres| f64::from(lens.coc_px(metres)));
         let (low, high) = radii_px.fold((0.0, 0.0), |(low, high): (f64, f64), px| (low.min(px), high.max(px)));

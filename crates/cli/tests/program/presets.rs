@@ -5,7 +5,7 @@ use crate::common;
 
 use std::fs;
 
-use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::cpu::BandedBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
@@ -126,7 +126,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     }
     // A live run uses one executor for all quality levels.
     let settings = look.blur_settings(size, true).unwrap();
-    let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
+    let mut cpu = BandedBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
     let job = Job::new(Pooled::detached(color.clone()), Some(Pooled::detached(map)), field);
     cpu.submit(Job { quality, ..job }).unwrap();
     (cpu.collect(true).unwrap().unwrap().picture.memory().unwrap().clone(), field)

@@ -41,12 +41,17 @@ impl HeldBlur {
         Self { held, focus, blur: Blur::default() }
     }
 
-    /// Returns the frame blurred with `look`, which belongs to the look change `change`.
+    /// Returns the frame blurred with `look`, which belongs to the look change `change`, on `threads` threads.
     ///
     /// # Errors
     /// Returns a one-line message if the look needs depth that the frame lacks, or the executor cannot be created or
     /// fails.
-    pub fn reblur(&mut self, look: &Look, change: u64, services: &mut dyn Services) -> Result<Still, String> {
+    pub fn reblur(
+        &mut self,
+        look: &Look,
+        change: u64,
+        (threads, services): (usize, &mut dyn Services),
+    ) -> Result<Still, String> {
         let Still { number, images, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.for_frame(coc, None) } else { look.clone() };
         let size = images.color.size();
@@ -58,7 +63,7 @@ impl HeldBlur {
         if fixed.coc_kind().is_some() {
             let depth = reblurred.depth.take().map(Depth::Final);
             (coc, reblurred.depth) =
-                still::compute_coc_and_depth(&fixed, &mut reblurred.color, depth).map_err(plain)?;
+                still::compute_coc_and_depth(&fixed, &mut reblurred.color, depth, Some(threads)).map_err(plain)?;
         }
         self.blur.set_look(&fixed, (size, false), |settings| services.create_executor(settings, size))?;
         if let Err(error) = self.blur.blur(&mut reblurred, coc) {

@@ -7,8 +7,7 @@ use bokehcam::bokeh::BokehError;
 use bokehcam::compute::Backend;
 use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::backdrop::Background;
-use bokehcam::engine;
-use bokehcam::engine::still::{Depth, Rendered};
+use bokehcam::engine::still::{Depth, Rendered, render_picture};
 use bokehcam::look::Look;
 use bokehcam::recording::Photo;
 
@@ -19,25 +18,17 @@ pub(super) fn blur(
     look: &Look,
     computing: &ComputeOptions,
 ) -> Result<String, BokehError> {
-    let color = mem::take(&mut photo.color);
     let is_transparent = look.background == Background::Transparent;
-    let Some(picture) = photo.codes.take_if(|_| !is_transparent) else {
-        if photo.is_16bit {
-            log::note("--behind transparent: what is blurred gets 8 bits; what is sharp keeps its 16");
-        }
-        let before = photo.codes.is_some().then(|| color.clone());
-        let Rendered { color, alpha, by } = engine::still::render_picture(look, color, depth, computing)?;
-        if let (Some(codes), Some(before)) = (&mut photo.codes, before) {
-            codes.take_changes(&before.rgb, &color.rgb);
-        }
-        photo.color = color;
-        alpha.iter().for_each(|alpha| photo.multiply_alpha(alpha));
-        return Ok(by);
-    };
-    if computing.backend == Backend::Gpu || computing.adapter.is_some() {
+    if is_transparent && photo.is_16bit {
+        log::note("--behind transparent: what is blurred gets 8 bits; what is sharp keeps its 16");
+    }
+    let wants_gpu = computing.backend == Backend::Gpu || computing.adapter.is_some();
+    if wants_gpu && photo.codes.is_some() && !is_transparent {
         log::note("16 bits and tone curves other than sRGB's are blurred by the processor, not the GPU");
     }
-    let (blurred, executor) = engine::still::blur_picture_16bit(look, color, picture, depth, computing.threads)?;
-    photo.codes = Some(blurred);
-    Ok(executor)
+    let (color, codes) = (mem::take(&mut photo.color), photo.codes.take());
+    let Rendered { color, codes, alpha, by } = render_picture(look, color, codes, depth, computing)?;
+    (photo.color, photo.codes) = (color, codes);
+    alpha.iter().for_each(|alpha| photo.multiply_alpha(alpha));
+    Ok(by)
 }
