@@ -219,15 +219,12 @@ impl<'a> Stage<'a> {
         let Some(done) = self.in_flight.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
-        // Time in flight splits into the blur itself and the wait behind other frames.
         let BlurredFrame { picture, mut color, mut depth, times, reused, .. } = finished;
         self.times.reused += f64::from(reused);
-        let (now_ns, began_ns, queueing_ns) = (clock.now_ns(), done.since_ns, done.trace.queueing_ns);
+        let (now_ns, began_ns) = (clock.now_ns(), done.since_ns);
         let (mut frame, InFlight { coc, crop, original, kept }) = done.take_item(now_ns);
         let (kept, kept_ns) = kept.unzip();
         frame.trace.blur_ns = self.record_times(&frame, &times, now_ns - began_ns, kept_ns.unwrap_or(0));
-        frame.trace.queueing_ns = queueing_ns + (now_ns - began_ns).saturating_sub(frame.trace.blur_ns);
-        frame.trace.passes = times;
         if let (Some(mut original), Some(map)) = (original, &mut depth) {
             original.restore(&mut color, map);
         }

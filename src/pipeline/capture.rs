@@ -93,10 +93,6 @@ impl<'a> Stage<'a> {
                         None => self.pacer.wait_until_due(stamp.time_ns, read_ns, || stopped() || has_request()),
                     };
                     let ticket = counter.count_captured(captured_ns);
-                    let since_ns = clock.now_ns();
-                    // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
-                    let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
-                    let queueing_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
                     let frame = Frame {
                         ticket,
                         stamp,
@@ -104,8 +100,8 @@ impl<'a> Stage<'a> {
                         is_seek_target: request.is_some(),
                         change: 0,
                         is_transitional: false,
-                        trace: Trace { decode_ns: read_ns, queueing_ns, ..Trace::default() },
-                        since_ns,
+                        trace: Trace::default(),
+                        since_ns: clock.now_ns(),
                         item: CapturedFrame { color, depth, right, ahead_ns },
                     };
                     if !frame.send_to(&mut to, counter) {

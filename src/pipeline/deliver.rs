@@ -83,13 +83,13 @@ impl<'a> Stage<'a> {
             let has_alpha = self.separate_alpha(&mut frame.item, is_cropped);
             let (mut frame, mut blurred) = frame.take_item(clock.now_ns());
             let captured_ns = frame.ticket.captured_ns;
+            let mut began_ns = frame.since_ns;
             // Wait for the frame's play-out time, against jitter.
             if let Some(playout) = &mut self.playout {
                 clock.sleep_until_ns(playout.due_time_ns(captured_ns, frame.since_ns));
-                frame.trace.playout_ns = clock.now_ns() - frame.since_ns;
-                self.times.playout.add(frame.trace.playout_ns);
+                began_ns = clock.now_ns();
+                self.times.playout.add(began_ns - frame.since_ns);
             }
-            let began_ns = frame.since_ns + frame.trace.playout_ns;
             frame.trace.age_ns = began_ns.saturating_sub(captured_ns);
             let (form, time_ns) = ((is_cropped, has_alpha), frame.stamp.time_ns);
             let was_given = match self.write_to_sink(&mut blurred.picture, form, captured_ns, time_ns) {
@@ -115,7 +115,6 @@ impl<'a> Stage<'a> {
             done.into_iter().for_each(|ticket| counter.count_delivered(ticket));
             if let Some(view) = &mut self.view {
                 let Blurred { picture, color, depth, coc, crop, .. } = blurred;
-                let frames = counter.frame_counts();
                 let view_of = View {
                     picture,
                     color,
@@ -129,7 +128,6 @@ impl<'a> Stage<'a> {
                     seek,
                     is_seek_target,
                     trace,
-                    frames,
                 };
                 match view.send(view_of) {
                     // A displaced frame is the previous one, which the viewer did not take.

@@ -24,10 +24,9 @@ pub(super) struct Frame<T> {
 }
 
 impl<T> Frame<T> {
-    /// Starts the next stage: adds the time waited until now, and separates the frame's data from the rest.
+    /// Starts the next stage at `now_ns`: separates the frame's data from the rest.
     pub fn take_item(self, now_ns: u64) -> (Frame<()>, T) {
-        let Self { ticket, stamp, seek, is_seek_target, change, is_transitional, mut trace, since_ns, item } = self;
-        trace.queueing_ns += now_ns.saturating_sub(since_ns);
+        let Self { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, item, .. } = self;
         (
             Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, since_ns: now_ns, item: () },
             item,

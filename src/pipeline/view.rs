@@ -1,12 +1,11 @@
 //! The public view of a run in progress.
 
-use crate::bokeh::{PassTimes, Picture};
+use crate::bokeh::Picture;
 use crate::budget::Quality;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
-use crate::stats::FrameCounts;
 
 /// The progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,8 +48,6 @@ pub struct View {
     pub is_seek_target: bool,
     /// Its processing times.
     pub trace: Trace,
-    /// The counts of the run up to this frame.
-    pub frames: FrameCounts,
 }
 
 impl View {
@@ -69,7 +66,6 @@ impl View {
             seek: 0,
             is_seek_target: false,
             trace: Trace::default(),
-            frames: FrameCounts::default(),
         }
     }
 }
@@ -79,20 +75,12 @@ impl View {
 pub struct Trace {
     /// Whether it reuses the depth of an earlier frame.
     pub is_depth_reused: bool,
-    /// Reading and decoding, waits excluded.
-    pub decode_ns: u64,
     /// Depth and CoC.
     pub depth_ns: u64,
     /// The blur; 0 if there was none.
     pub blur_ns: u64,
-    /// All waits between stages until it was ready: in links, and behind other frames in the executor.
-    pub queueing_ns: u64,
-    /// The wait for its play-out time.
-    pub playout_ns: u64,
-    /// Its age at output: all of the above, except a stored frame's decoding, which is over before it is captured.
+    /// Its age at output.
     pub age_ns: u64,
-    /// The passes of the blur.
-    pub passes: PassTimes,
     /// The quality level of the blur.
     pub quality: Option<Quality>,
 }

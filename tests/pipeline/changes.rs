@@ -117,7 +117,6 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
                     let picture = view.picture.memory().expect("it is in memory");
                     assert_eq!(before.rgb[1..], picture.rgb[1..]);
                     assert_eq!((picture.rgb[0], view.coc), (7, CocField::Uniform { radius_px: 7.0 }));
-                    assert!(view.frames.captured > 0);
                     seen += 1;
                     thread::sleep(Duration::from_millis(patience_ms));
                 }

@@ -32,7 +32,7 @@ const FIRST_PAGE: [&str; 20] = [
 ];
 /// Further settings on the first page of single commands.
 const FIRST_PAGE_EXTRA: [(&str, &[&str]); 5] = [
-    ("preview", &["split", "instruments", "fresh"]),
+    ("preview", &["split", "fresh"]),
     ("render", &["depth-unit", "depth-scale", "tilt"]),
     ("record", &["start", "end", "depth-scale"]),
     ("dump", &["backend", "threads"]),

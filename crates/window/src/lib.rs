@@ -10,7 +10,6 @@
 
 pub mod dialog;
 pub mod keys;
-pub mod meters;
 pub mod panel;
 pub mod present;
 pub mod remote_changes;

@@ -43,7 +43,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 Examples:
   cargo bench --bench preview
   cargo bench --bench preview -- --rounds 9 somewhere/rgbd
-  cargo bench --bench preview -- --instruments --quality fast"
+  cargo bench --bench preview -- --panel --quality fast"
 )]
 struct Options {
     /// A folder with a recording that has depth [default: the synthetic scene, recorded anew at --size]
@@ -63,9 +63,6 @@ struct Options {
     /// Quality level of both: one that changes would compare unlike work
     #[arg(long, value_name = "LEVEL", default_value = "fast")]
     quality: String,
-    /// With the instruments shown
-    #[arg(long)]
-    instruments: bool,
     /// With the controls shown
     #[arg(long)]
     panel: bool,
@@ -176,7 +173,6 @@ fn run_program(options: &Options, folder: &Path, window: bool, screen: &Screen, 
     let mut command = bokehcam_command();
     if window {
         command.args(["preview", &format!("--panel={}", options.panel)]);
-        command.arg(format!("--instruments={}", options.instruments));
     } else {
         command.args(["stream", "--loop", "--pace", "realtime", "--to", "null"]);
     }

@@ -14,7 +14,7 @@ use super::window::{PATIENCE, Window};
 
 /// Number of key presses per case.
 const PRESSES: usize = 120;
-/// An area that the instruments cover when shown: left, top, width and height, in window pixels.
+/// An area that differs in brightness between the picture and its depth: left, top, width and height, in window pixels.
 const CORNER: (i16, i16, u16, u16) = (60, 30, 60, 60);
 /// The picture whose read blocks for ever.
 const STUCK: &str = "rgb/stuck.png";
@@ -91,13 +91,13 @@ fn mean_brightness(bytes: &[u8]) -> f64 {
     bytes.iter().map(|byte| f64::from(*byte)).sum::<f64>() / bytes.len().max(1) as f64
 }
 
-/// Toggles the instruments by key, and waits until they appear or disappear. The result includes the harness's pause
+/// Toggles the view of depth by key, and waits until it appears or disappears. The result includes the harness's pause
 /// after a key, which is its lower bound.
 fn measure_reaction(window: &Window, press: usize) -> Option<f64> {
     std::thread::sleep(Duration::from_millis(90 + 37 * (press as u64 % 7)));
     let before = mean_brightness(&capture_corner(window)?);
     let began = Instant::now();
-    window.key(&[], u32::from('i'));
+    window.key(&[], u32::from('d'));
     while began.elapsed() < PATIENCE {
         if (mean_brightness(&capture_corner(window)?) - before).abs() > 8.0 {
             return Some(began.elapsed().as_secs_f64() * 1e3);

@@ -23,10 +23,6 @@ pub struct Window {
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub full_screen: bool,
-    /// Show frame times, latency and drops
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
-    pub instruments: bool,
     /// Show the controls; --panel=false starts without them
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
           default_missing_value = "true", value_parser = parse_switch, action = clap::ArgAction::Set)]

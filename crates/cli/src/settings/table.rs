@@ -18,8 +18,7 @@ pub type Values = BTreeMap<String, String>;
 pub const PREFIX: &str = "BOKEHCAM_";
 
 /// Window-only settings that the window writes into composed commands with its current values.
-pub const WINDOW_STATE: [&str; 8] =
-    ["show", "split", "full-screen", "instruments", "panel", "text-scale", "single-keys", "fresh"];
+pub const WINDOW_STATE: [&str; 7] = ["show", "split", "full-screen", "panel", "text-scale", "single-keys", "fresh"];
 /// The other window-only settings, which keep their initial values.
 pub const WINDOW_START: [&str; 3] = ["language", "theme", "save-to"];
 

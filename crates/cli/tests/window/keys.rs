@@ -121,7 +121,7 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
         last = Some(image.clone());
         same
     });
-    for (name, c) in [("mirrored", 'm'), ("depth", 'd'), ("radii", 'c'), ("bins", 'n'), ("before and after", 'b')] {
+    for (name, c) in [("mirrored", 'm'), ("depth", 'd'), ("before and after", 'b')] {
         window.key(&[], u32::from(c));
         window.until(name, |image| distance(image, &before) > 1.0);
         window.key(&[], u32::from(c));

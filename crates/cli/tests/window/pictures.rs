@@ -28,16 +28,15 @@ fn save(image: &ColorImage, path: &Path) {
 #[ignore = "needs an X server"]
 fn pictures_for_the_docs() {
     let look = ["--highlights", "12", "--coc-at-infinity", "3%", "--save-to", "."];
-    // File name, arguments and keys of each screenshot.
-    let scenes: [(&str, &[&str], &[char]); 4] = [
-        ("panel", &[], &[]),
-        ("split", &["--split", "0.52", "--panel=false"], &[]),
-        ("depth", &["--show", "depth", "--panel=false"], &[]),
-        ("instruments", &["--panel=false"], &['i']),
+    // File name and arguments of each screenshot.
+    let scenes: [(&str, &[&str]); 3] = [
+        ("panel", &[]),
+        ("split", &["--split", "0.52", "--panel=false"]),
+        ("depth", &["--show", "depth", "--panel=false"]),
     ];
     std::fs::create_dir_all(folder()).unwrap();
     let mut seen: Vec<ColorImage> = Vec::new();
-    for (name, more, keys) in scenes {
+    for (name, more) in scenes {
         let screen = Screen::new();
         let home = Home::new();
         // The window shows the relative name instead of the project's path.
@@ -46,8 +45,7 @@ fn pictures_for_the_docs() {
         let mut program = Program::start_at(&screen, home, &arguments);
         let window = program.window();
         window.until("the first picture", |image| name == "depth" || is_photograph(image));
-        keys.iter().for_each(|key| window.key(&[], u32::from(*key)));
-        // Wait until notes are gone and the graph is full; the panel stays visible while the pointer is on it.
+        // Wait until notes are gone; the panel stays visible while the pointer is on it.
         for step in 0..12 {
             if name == "panel" {
                 window.point((0.80 + 0.002 * f64::from(step), 0.04));

@@ -43,11 +43,6 @@ fn edit_look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)
     (look != state.look).then(|| Action::Look { look: Box::new(look), stroke: Some(stroke) })
 }
 
-/// Toggles between `shown` and the normal picture.
-fn toggle_view(state: &State, shown: ViewMode) -> Option<Action> {
-    Some(Action::Show(if state.shown == shown { ViewMode::Picture } else { shown }))
-}
-
 /// Returns the direction of a pair of opposite keys: -1 for the first chord of the pair, 1 for the second.
 fn direction_sign(context: Context) -> f32 {
     if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
@@ -207,10 +202,8 @@ pub const GROUPS: [Group; 5] = [
                 },
             ),
             bind_once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
-            bind_once(&[key(Key::D)], "D", "show depth", |state, _| toggle_view(state, ViewMode::Depth)),
-            bind_once(&[key(Key::C)], "C", "show the blur radius", |state, _| toggle_view(state, ViewMode::Coc)),
-            bind_once(&[key(Key::N)], "N", "show the layers of the blur", |state, _| {
-                toggle_view(state, ViewMode::Bins)
+            bind_once(&[key(Key::D)], "D", "show depth", |state, _| {
+                Some(Action::Show(if state.shown == ViewMode::Depth { ViewMode::Picture } else { ViewMode::Depth }))
             }),
         ],
     },
@@ -241,7 +234,6 @@ pub const GROUPS: [Group; 5] = [
             bind_once(&[key(Key::P), key(Key::Space)], "P, Space", "the panel", |state, _| {
                 Some(Action::Panel(!state.panel))
             }),
-            bind_once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
             bind_once(&[key(Key::H)], "H", "only the picture", |state, _| {
                 Some(Action::HideControls(!state.controls_hidden))
             }),

@@ -57,7 +57,6 @@ fn switches_toggle() {
         (Key::Z, |state| state.frozen),
         (Key::P, |state| state.panel),
         (Key::Space, |state| state.panel),
-        (Key::I, |state| state.instruments),
         (Key::H, |state| state.controls_hidden),
         (Key::F, |state| state.full_screen),
         (Key::F11, |state| state.full_screen),
@@ -65,8 +64,6 @@ fn switches_toggle() {
         (Key::Questionmark, |state| state.help),
         (Key::B, |state| state.split.is_some()),
         (Key::D, |state| state.shown == ViewMode::Depth),
-        (Key::C, |state| state.shown == ViewMode::Coc),
-        (Key::N, |state| state.shown == ViewMode::Bins),
         (Key::V, |state| state.recording().is_some()),
         (Key::O, |state| state.virtual_camera().is_some()),
     ] {

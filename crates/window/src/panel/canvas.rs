@@ -143,8 +143,6 @@ impl Gestures {
             let after = match state.shown {
                 ViewMode::Picture => "After",
                 ViewMode::Depth => "Depth",
-                ViewMode::Coc => "Blur radius",
-                ViewMode::Bins => "Layers",
             };
             marks::draw_split(&painter, viewport, at, is_line_held, after);
         }

@@ -9,13 +9,12 @@ use super::theme::{Colors, GAP, PAD, card_frame, medium_font};
 use super::widgets::add_switch;
 use crate::texts::tr;
 
-const GESTURES: [(&str, &str); 9] = [
+const GESTURES: [(&str, &str); 8] = [
     ("Click", "focus there"),
     ("Double-click", "focus on the object there, and follow it"),
     ("Wheel", "less blur, more blur"),
     ("Ctrl+Wheel, pinch", "zoom in and out, in actual pixels"),
     ("Drag", "move the enlarged picture"),
-    ("Alt", "depth and blur under the pointer"),
     ("Drag the line", "move the split between before and after"),
     ("Drag the marks", "move, widen and turn the band of tilt-shift"),
     ("Tab", "go to the next control; Space and the arrow keys change it"),

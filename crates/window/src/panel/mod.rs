@@ -8,12 +8,9 @@ mod dock;
 mod fonts;
 mod help;
 mod icons;
-mod instruments;
-mod legend;
 mod marks;
 mod notes;
 mod plate;
-mod probe;
 mod sections;
 mod sheet;
 #[cfg(test)]
@@ -34,7 +31,7 @@ use egui::{Context, Event, Id, Ui, Vec2};
 
 use super::present::{Area, VisibleRegion};
 use super::state::{Action, State};
-use super::{keys, meters, state, views};
+use super::{keys, state};
 use canvas::Gestures;
 use dock::Dock;
 use viewport::Viewport;
@@ -65,7 +62,6 @@ pub struct Panel {
     stroke_s: Option<f64>,
     gestures: Gestures,
     sheet: sheet::PanelState,
-    instruments: instruments::Instruments,
     notes: notes::NoteTimes,
     badges: badges::Badges,
     /// The control that had the focus before a modal covered the window.
@@ -74,8 +70,6 @@ pub struct Panel {
     covered: bool,
     timer: timer::SelfTimer,
     transport: transport::TransportBar,
-    /// Position to probe for depth and blur, as fractions of the picture.
-    pub probed: Option<[f32; 2]>,
     /// Whether the window is too small for the chosen text scale.
     is_text_limited: bool,
     /// Whether a control had the focus or a popup was open at the end of the last pass.
@@ -114,16 +108,11 @@ impl Panel {
         // Must precede keys and gestures: their zoom steps depend on the current layout.
         dock::set_picture_area(&ctx, dock.map_or(window, |dock| dock.picture_area));
         self.read_keys(ui, state, size, actions);
-        self.probed = None;
         if let Some(viewport) = viewport {
             self.gestures.show(ui, state, viewport, self.is_wake_touch, actions);
-            self.probed = probe::probed_point(ui, state, &viewport);
         }
         if state.full_screen && self.is_pointer_idle(ui) {
             ctx.set_cursor_icon(egui::CursorIcon::None);
-        }
-        if self.probed.is_some() {
-            probe::show(&ctx, state);
         }
         let mut bottom = 0.0;
         self.sheet.show(&ctx, state, dock, size, actions);
@@ -133,10 +122,6 @@ impl Panel {
             }
             if in_use || dock.is_some() {
                 bottom = self.transport.show(&ctx, state, actions);
-            }
-            legend::show(ui, state, bottom);
-            if state.instruments {
-                self.instruments.show(&ctx, state);
             }
         }
         self.badges.show(&ctx, state);

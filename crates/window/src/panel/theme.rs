@@ -8,8 +8,6 @@ use egui::{
     Style, TextStyle, Theme, Vec2, Visuals,
 };
 
-use bokehcam::budget::Quality;
-
 /// Width of the panel, in points.
 pub const WIDTH: f32 = 300.0;
 /// Distance of panel and cards from the window's border, in points.
@@ -98,22 +96,6 @@ impl Colors {
     /// Returns the colours of the active theme.
     pub fn for_ui(ui: &egui::Ui) -> Self {
         Self::for_theme(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
-    }
-}
-
-/// Returns the colour of a quality level, and a letter for colour-blind users.
-pub fn quality_color(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
-    let pick = |on_dark: [u8; 3], on_light: [u8; 3]| {
-        let [r, g, b] = if theme == Theme::Light { on_light } else { on_dark };
-        Color32::from_rgb(r, g, b)
-    };
-    match quality {
-        None => (pick([150, 153, 160], [96, 100, 108]), "–"),
-        Some(Quality::Draft) => (pick([255, 122, 110], [180, 44, 36]), "D"),
-        Some(Quality::Fast) => (pick([255, 190, 92], [150, 82, 0]), "F"),
-        Some(Quality::Balanced) => (pick([126, 200, 140], [30, 108, 52]), "B"),
-        Some(Quality::High) => (pick([110, 180, 250], [20, 100, 180]), "H"),
-        Some(Quality::Best) => (pick([200, 160, 255], [110, 60, 170]), "X"),
     }
 }
 

@@ -96,7 +96,6 @@ impl PipelineRun {
             depth_methods,
             depth_method,
             executor,
-            budget_ns,
         });
         let pipeline_run = Self { size: info.size, source_depth, changes, stop, guide, thread };
         Ok((pipeline_run, source))

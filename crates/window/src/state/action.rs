@@ -54,8 +54,6 @@ pub enum Action {
     Step(i32),
     /// Opens or closes the panel.
     Panel(bool),
-    /// Shows or hides the instruments.
-    Instruments(bool),
     /// Shows only the picture, or everything again.
     HideControls(bool),
     /// Shows or hides the help.

@@ -12,8 +12,6 @@ pub const NO_DEPTH_OF_PHOTO: &str =
 pub const DEPTH_DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
 /// Shown when the depth view is requested while depth is not computed.
 pub const DEPTH_NOT_COMPUTED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
-/// Shown when a view of the blur's internals is requested without blur.
-pub const NOT_BLURRED: &str = "Nothing is blurred, so there is nothing to show here.";
 /// Shown when a background plate is requested but the source is not a camera.
 pub const NO_PLATE: &str = "Open a camera first: a plate needs a camera that does not move.";
 /// Shown when a look needs metric depth but the depth is relative.
@@ -53,7 +51,6 @@ impl State {
             // Views without data are refused, with a note that explains why.
             Action::Show(ViewMode::Depth) if !self.may_have_depth() => self.note(self.no_depth_advice()),
             Action::Show(ViewMode::Depth) if !self.look.effect.follows_depth() => self.note(DEPTH_NOT_COMPUTED),
-            Action::Show(ViewMode::Coc | ViewMode::Bins) if self.look.effect == Effect::None => self.note(NOT_BLURRED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
@@ -67,7 +64,6 @@ impl State {
             Action::Seek(frame) => return self.seek(frame),
             Action::Step(by) => return self.step_frames(by),
             Action::Panel(on) => self.panel = on,
-            Action::Instruments(on) => self.instruments = on,
             Action::HideControls(on) => self.controls_hidden = on,
             Action::Help(on) => self.help = on,
             Action::TextScale(scale) => self.preferences.set_text_scale(scale),
@@ -178,11 +174,6 @@ impl State {
             if self.shown == ViewMode::Depth {
                 self.shown = ViewMode::Picture;
             }
-        }
-        if look.effect != Effect::None {
-            self.withdraw_note(NOT_BLURRED);
-        } else if matches!(self.shown, ViewMode::Coc | ViewMode::Bins) {
-            self.shown = ViewMode::Picture;
         }
         self.look = look;
         vec![Request::Look(Box::new(self.look.clone()))]

@@ -14,7 +14,6 @@ impl State {
             ("split", self.split.map(|at| format!("{at:.3}"))),
             ("mirror", (self.mirror != self.camera.faces_user).then(|| self.mirror.to_string())),
             ("full-screen", yes(self.full_screen)),
-            ("instruments", yes(self.instruments)),
             ("panel", (!self.panel).then(|| "false".to_owned())),
             // Without any look setting the saved look would be loaded.
             ("fresh", yes(self.look == Look::default())),

@@ -35,9 +35,7 @@ pub use preferences::{Preferences, TEXT_SCALE_RANGE};
 pub use transport::Transport;
 pub use zoom::Zoom;
 
-use super::meters::Meters;
 pub use super::views::ViewMode;
-use super::views::{Legend, Probe};
 use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::demo;
 use bokehcam::depth::plate::Step;
@@ -83,8 +81,6 @@ pub struct Running {
     pub depth_methods: Vec<DepthMethod>,
     pub depth_method: Option<DepthMethod>,
     pub executor: String,
-    /// Time budget for the blur of a frame.
-    pub budget_ns: u64,
 }
 
 /// An active output.
@@ -148,14 +144,10 @@ pub struct State {
     /// Playback position, if the source is a recording.
     pub transport: Option<Transport>,
     pub zoom: Zoom,
-    /// Values under the pointer, while the probe is shown.
-    pub probe: Option<Probe>,
     /// Split position as a fraction of the width: left of it, the picture is shown before the blur.
     pub split: Option<f32>,
     /// Whether the panel is open.
     pub panel: bool,
-    /// Whether the instruments are shown.
-    pub instruments: bool,
     /// Whether all controls and overlays are hidden.
     pub controls_hidden: bool,
     /// Whether the help is shown.
@@ -166,8 +158,6 @@ pub struct State {
     pub silent_s: Option<u64>,
     /// Distance of the focal plane in the last frame, in metres.
     pub focus_m: Option<f32>,
-    /// Colour legend of a diagnostic view.
-    pub legend: Option<Legend>,
     /// Messages to the user, newest last, at most `MAX_NOTES`.
     pub notes: Vec<Note>,
     /// Progress of the background plate, if depth comes from it.
@@ -184,7 +174,6 @@ pub struct State {
     pub recorded_bytes: Option<u64>,
     /// Failure of an output, until the user dismisses it.
     pub output_failure: Option<String>,
-    pub meters: Meters,
     /// Undo and redo history of the look.
     pub history: History,
     /// Whether the effect differs from the chosen one because the source has no depth.

@@ -36,10 +36,9 @@ impl State {
 
 #[cfg(test)]
 mod tests {
-    use crate::state::apply::{NOT_BLURRED, OUTPUTS_CONTINUE};
+    use crate::state::apply::OUTPUTS_CONTINUE;
     use crate::state::sample::state;
-    use crate::state::{Action, Output, Update, ViewMode};
-    use bokehcam::look::{Effect, Look};
+    use crate::state::{Action, Output, Update};
 
     #[test]
     fn notes_are_few_and_numbered_and_none_is_there_twice() {
@@ -64,11 +63,5 @@ mod tests {
         assert!(says(&state, OUTPUTS_CONTINUE));
         state.apply(Action::Freeze(false));
         assert!(!says(&state, OUTPUTS_CONTINUE));
-        let plain = Look { effect: Effect::None, ..state.look.clone() };
-        state.apply(Action::Look { look: Box::new(plain), stroke: None });
-        state.apply(Action::Show(ViewMode::Coc));
-        assert!(says(&state, NOT_BLURRED));
-        state.apply(Action::Portrait(true));
-        assert!(!says(&state, NOT_BLURRED));
     }
 }

@@ -31,7 +31,6 @@ pub fn running(has_depth: bool) -> Source {
         depth_methods: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },
         depth_method: has_depth.then_some(DepthMethod::Measured),
         executor: "cpu, 2 threads, AVX2".into(),
-        budget_ns: 33_333_333,
     })
 }
 

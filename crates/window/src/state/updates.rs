@@ -44,7 +44,6 @@ impl State {
     /// Sets the source, and adapts the view and the look to it.
     fn set_source(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
-            self.meters.clear_recent();
             self.source_name.clone_from(&running.name);
         }
         self.source = source;

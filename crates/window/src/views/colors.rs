@@ -1,29 +1,13 @@
-//! Colour maps.
+//! The colour map of depth.
 
 use std::sync::LazyLock;
 
-/// Number of entries in the table of [`viridis`] colours.
+/// Number of colours.
 pub const COLORMAP_SIZE: usize = 256;
 
-/// Colours of bins, front to back: after Okabe and Ito, lightened or darkened so that neighbours differ in lightness.
-pub const BIN_COLORS: [[u8; 3]; 13] = [
-    [230, 159, 0],
-    [120, 60, 20],
-    [240, 228, 66],
-    [0, 114, 178],
-    [150, 205, 240],
-    [0, 100, 75],
-    [204, 121, 167],
-    [110, 40, 90],
-    [213, 170, 150],
-    [180, 70, 0],
-    [190, 230, 190],
-    [70, 70, 90],
-    [220, 220, 225],
-];
-
-/// Viridis, approximated by polynomials (Matt Zucker, public domain).
-static VIRIDIS: LazyLock<[[u8; 3]; COLORMAP_SIZE]> = LazyLock::new(|| {
+/// Viridis, from dark violet to light yellow, perceptually uniform; approximated by polynomials (Matt Zucker, public
+/// domain).
+pub static VIRIDIS: LazyLock<[[u8; 3]; COLORMAP_SIZE]> = LazyLock::new(|| {
     const TERMS: [[f64; 3]; 7] = [
         [0.277_727_327_223_417_7, 0.005_407_344_544_966_578, 0.334_099_805_335_306_1],
         [0.105_093_043_108_577_4, 1.404_613_529_898_575, 1.384_590_162_594_685],
@@ -40,20 +24,3 @@ static VIRIDIS: LazyLock<[[u8; 3]; COLORMAP_SIZE]> = LazyLock::new(|| {
         [0, 1, 2].map(|channel| (at(channel) * 255.0).round().clamp(0.0, 255.0) as u8)
     })
 });
-
-/// Returns the colours from 0 (darkest, violet) to 1 (lightest, yellow), perceptually uniform.
-pub fn viridis() -> &'static [[u8; 3]; COLORMAP_SIZE] {
-    &VIRIDIS
-}
-
-/// Returns a diverging colour for `position` from -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind:
-/// blue), equally dark at both ends.
-pub fn diverging_color(position: f32) -> [u8; 3] {
-    const SHARP: [f32; 3] = [246.0, 246.0, 242.0];
-    const NEAR: [[f32; 3]; 2] = [[238.0, 150.0, 70.0], [122.0, 30.0, 20.0]];
-    const FAR: [[f32; 3]; 2] = [[90.0, 160.0, 215.0], [16.0, 42.0, 105.0]];
-    let [middle, end] = if position < 0.0 { NEAR } else { FAR };
-    let t = 2.0 * position.abs().min(1.0);
-    let (from, to, t) = if t < 1.0 { (SHARP, middle, t) } else { (middle, end, t - 1.0) };
-    std::array::from_fn(|k| (from[k] + (to[k] - from[k]) * t).round() as u8)
-}

@@ -1,8 +1,6 @@
 //! The depth view: colours linear in dioptres (1/m), like the blur and like depth perception.
 
-use super::Legend;
-use super::coc_sampler::depth_row;
-use super::colors::{COLORMAP_SIZE, viridis};
+use super::colors::{COLORMAP_SIZE, VIRIDIS};
 use bokehcam::frame::{ColorImage, DepthMap};
 
 /// Number of histogram cells over dioptres, up to `NEAREST_DIOPTRES`: 0.1 m.
@@ -19,48 +17,63 @@ const UNKNOWN_COLORS: [[u8; 3]; 2] = [[96, 96, 96], [150, 150, 150]];
 /// Far and near end in dioptres until a depth is known: 5 m to 1 m.
 const INITIAL_RANGE: [f32; 2] = [0.2, 1.0];
 
-/// Colour range: far and near end in dioptres, smoothed over time.
+/// Draws depth maps in the size of their pictures.
 #[derive(Default)]
-pub struct ColorRange(Option<[f32; 2]>);
-
-/// Returns the position of a depth in the colour range: 0 at `far_m`, 1 at `near_m`, beyond these for depths outside.
-pub fn depth_fraction(depth_m: f32, near_m: f32, far_m: f32) -> f32 {
-    let (near, far) = (1.0 / near_m, 1.0 / far_m);
-    (1.0 / depth_m - far) / (near - far)
+pub struct DepthView {
+    image: ColorImage,
+    /// Far and near end of the colours in dioptres, smoothed over time; `None` until a depth is known.
+    range: Option<[f32; 2]>,
+    /// The depth map's column for each column of the image.
+    columns: Vec<u32>,
 }
 
-/// Draws a depth map; `columns` has the map's column for each column of the image.
-pub fn draw(depth: &DepthMap, columns: &[u32], range: &mut ColorRange, image: &mut ColorImage) -> Legend {
-    let [far, near] = range.update(depth);
-    let colors = viridis();
-    let (scale, rows) = ((COLORMAP_SIZE - 1) as f32 / (near - far), image.height);
-    let row_bytes = image.width as usize * 3;
-    if depth.height > 0 {
-        for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
-            let depths = depth_row(depth, y, rows);
-            for ((x, pixel), &column) in (0u32..).zip(row.as_chunks_mut::<3>().0).zip(columns) {
-                let metres = depths[column as usize];
-                *pixel = if DepthMap::is_known(metres) {
-                    colors[((1.0 / metres - far) * scale).clamp(0.0, (COLORMAP_SIZE - 1) as f32) as usize]
-                } else {
-                    UNKNOWN_COLORS[usize::from((x / 4 + y / 4) % 2 == 0)]
-                };
+impl DepthView {
+    /// Draws the depth map of a picture of `size` pixels. Allocates only if the size changes.
+    pub fn draw(&mut self, depth: &DepthMap, size: (u32, u32)) -> &ColorImage {
+        let [far, near] = self.update_range(depth);
+        let Self { image, columns, .. } = self;
+        image.resize(size.0, size.1);
+        columns.clear();
+        columns.extend((0..size.0).map(|x| scale_index(x, size.0, depth.width)));
+        let colors = &*VIRIDIS;
+        let scale = (COLORMAP_SIZE - 1) as f32 / (near - far);
+        let row_bytes = image.width as usize * 3;
+        if depth.height > 0 {
+            for (y, row) in (0..).zip(image.rgb.chunks_exact_mut(row_bytes.max(1))) {
+                let from = scale_index(y, size.1, depth.height) as usize * depth.width as usize;
+                let depths = &depth.metres[from..][..depth.width as usize];
+                for ((x, pixel), &column) in (0u32..).zip(row.as_chunks_mut::<3>().0).zip(&*columns) {
+                    let metres = depths[column as usize];
+                    *pixel = if DepthMap::is_known(metres) {
+                        colors[((1.0 / metres - far) * scale).clamp(0.0, (COLORMAP_SIZE - 1) as f32) as usize]
+                    } else {
+                        UNKNOWN_COLORS[usize::from((x / 4 + y / 4) % 2 == 0)]
+                    };
+                }
             }
         }
+        image
     }
-    Legend::Depth { near_m: 1.0 / near, far_m: 1.0 / far }
-}
 
-impl ColorRange {
+    /// Returns the image drawn last.
+    pub fn image(&self) -> &ColorImage {
+        &self.image
+    }
+
     /// Moves the range towards that of this map (exponential moving average); the first map sets it.
-    fn update(&mut self, depth: &DepthMap) -> [f32; 2] {
-        let Some(target) = percentile_range(depth) else { return self.0.unwrap_or(INITIAL_RANGE) };
-        let range = self.0.get_or_insert(target);
+    fn update_range(&mut self, depth: &DepthMap) -> [f32; 2] {
+        let Some(target) = percentile_range(depth) else { return self.range.unwrap_or(INITIAL_RANGE) };
+        let range = self.range.get_or_insert(target);
         for (end, target) in range.iter_mut().zip(target) {
             *end += (target - *end) * SMOOTHING;
         }
         *range
     }
+}
+
+/// Scales the index `at` of `from` pixels to an index of `to` pixels.
+fn scale_index(at: u32, from: u32, to: u32) -> u32 {
+    (u64::from(at) * u64::from(to) / u64::from(from.max(1))) as u32
 }
 
 /// Returns far and near end in dioptres, the percentiles [`OUTLIER_FRACTION`] and 1 - [`OUTLIER_FRACTION`]. `None` if

@@ -1,7 +1,7 @@
 //! The window: handles winit's events, and presents pictures and controls.
 //!
 //! Its thread never blocks for long. A new frame is presented immediately with the existing controls; the controls are
-//! laid out again only after events, and five times a second while the instruments are shown.
+//! laid out again only after events.
 
 mod app;
 mod desktop;

@@ -65,50 +65,31 @@ fn a_frame_allocates_nothing() {
     window();
 }
 
-/// A frame in the window: its views, painting unscaled and scaled, and the instruments.
+/// A frame in the window: its depth, and painting unscaled and scaled.
 fn window() {
-    use bokehcam::bokeh::Picture;
-    use bokehcam::optics::{CocField, DepthCoc};
-    use bokehcam::pipeline::{Trace, View};
-    use bokehcam_window::meters::Meters;
     use bokehcam_window::present::{Area, Drawing, Image, soft::Painter};
-    use bokehcam_window::state::ViewMode;
-    use bokehcam_window::views::Views;
+    use bokehcam_window::views::DepthView;
 
-    let (picture, depth) = (noise(160, 90), three_depths(160, 90));
-    let lens = DepthCoc { coc_at_infinity_px: 6.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 12.0 };
-    let view = View {
-        color: Some(Pooled::detached(picture.clone())),
-        depth: Some(Pooled::detached(depth)),
-        trace: Trace { quality: Some(Quality::Fast), ..Trace::default() },
-        ..View::new(Picture::from_memory(Pooled::detached(picture)), CocField::Depth(lens))
-    };
-    let settings = settings(COC_KINDS[2]);
-    let (mut views, mut meters) = (Views::default(), Meters::default());
+    let (color, depth) = (noise(160, 90), three_depths(160, 90));
+    let mut depth_view = DepthView::default();
     let mut painter = Painter::new();
     painter.resize((320, 200));
     let mut pixels = vec![0; 320 * 200];
     let mut frame = |at: u64| {
-        for shown in [ViewMode::Depth, ViewMode::Coc, ViewMode::Bins] {
-            views.draw(shown, &view, Some(&settings));
-        }
+        let picture = depth_view.draw(&depth, color.size());
         let areas = [Area { x: 80, y: 55, width: 160, height: 90 }, Area { x: 0, y: 10, width: 320, height: 180 }];
         for area in areas {
-            let before = view.color.as_deref().map(|color| (color, 0.4));
-            let (picture, background) = (Image::Memory(views.image()), [1, 2, 3]);
             let drawing = Drawing {
                 area,
                 visible_region: None,
-                picture,
-                before,
+                picture: Image::Memory(picture),
+                before: Some((&color, 0.4)),
                 mirror: at.is_multiple_of(2),
                 stale: at.is_multiple_of(3),
-                background,
+                background: [1, 2, 3],
             };
             painter.paint(&mut pixels, &drawing);
         }
-        meters.add_frame(&view, at * 33_000_000, 2_000_000);
-        meters.add_reaction(5_000_000);
     };
     // All combinations of sizes, mirrored or not, stale or not.
     (0..12).for_each(&mut frame);

@@ -210,7 +210,6 @@ fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, saved_
     state.split = window.split;
     state.mirror = mirror;
     state.full_screen = window.full_screen;
-    state.instruments = window.instruments;
     state.panel = window.panel;
     state.preferences = saved_state.preferences.clone();
     window.text_scale.into_iter().for_each(|scale| state.preferences.set_text_scale(scale));

@@ -135,7 +135,6 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor, thumb
         add_section(ui, form, "Controls of the camera", false, source::add_controls);
     }
     add_section(ui, form, "For experts", false, |ui, form| {
-        view::add_internals(ui, form);
         if blurs {
             quality::show(ui, form);
         }

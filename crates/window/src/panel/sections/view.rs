@@ -6,35 +6,19 @@ use super::PanelForm;
 use crate::panel::widgets::{Number, add_choice, add_number, add_remark};
 use crate::state::{Action, ViewMode};
 
-type Views = [(&'static str, &'static str, ViewMode); 2];
-
-const VIEWS: Views = [
+const VIEWS: [(&str, &str, ViewMode); 2] = [
     ("Picture", "The blurred picture", ViewMode::Picture),
     ("Depth", "Distance in colours: light is near (D)", ViewMode::Depth),
 ];
-const INTERNALS: Views = [
-    ("Blur radius", "Circle of confusion: white is sharp, hatched is in front (C)", ViewMode::Coc),
-    ("Layers", "The layers, each blurred separately (N)", ViewMode::Bins),
-];
-
-/// Adds radio buttons for views; clicking the active one returns to the picture.
-fn add_view_choice(ui: &mut Ui, form: &mut PanelForm, what: &str, views: Views) {
-    let (now, has_depth) = (form.state.shown, form.has_depth());
-    if let Some(shown) = add_choice(ui, what, &views, now, |shown| has_depth || shown != ViewMode::Depth) {
-        form.push_action(Action::Show(if shown == now { ViewMode::Picture } else { shown }));
-    }
-}
-
-/// Adds the views of the blur's internals, and the instruments.
-pub fn add_internals(ui: &mut Ui, form: &mut PanelForm) {
-    add_view_choice(ui, form, "Views of the blur", INTERNALS);
-    form.add_switch(ui, "Instruments", "Times, rates and drops (I)", form.state.instruments, Action::Instruments);
-}
 
 /// Adds the view, and options for its display.
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let state = form.state;
-    add_view_choice(ui, form, "Show", VIEWS);
+    let has_depth = form.has_depth();
+    // A click on the active view returns to the picture.
+    if let Some(shown) = add_choice(ui, "Show", &VIEWS, state.shown, |shown| has_depth || shown != ViewMode::Depth) {
+        form.push_action(Action::Show(if shown == state.shown { ViewMode::Picture } else { shown }));
+    }
     let hint = "Like a mirror; recordings and calls are not mirrored (M)";
     form.add_switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {

@@ -5,11 +5,10 @@ use std::path::Path;
 use egui::{Color32, Event, Key, Modifiers, Theme, pos2};
 
 use super::{Window, button, pressed, scrolled};
-use crate::panel::theme::{Colors, quality_color};
+use crate::panel::theme::Colors;
 use crate::present::soft::Painter;
 use crate::present::{Controls, Drawing, Image};
 use crate::state::{Action, Source, State, Transport, sample};
-use crate::views::Legend;
 use bokehcam::depth::plate::Step;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::Effect;
@@ -107,9 +106,7 @@ fn pictures() {
         }
     }
     crate::texts::set_translation(crate::texts::Table::new());
-    shot("instruments", Theme::Dark, &|state| {
-        state.instruments = true;
-        state.meters.fill_with_samples();
+    shot("split", Theme::Dark, &|state| {
         state.split = Some(0.4);
         state.note("Saved snapshot-0001.png");
     });
@@ -143,25 +140,9 @@ fn pictures() {
         shot(name, theme, &|state| {
             let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
             state.transport = Some(Transport { frame: 280, frames: 738, time_ns, length_ns });
-            state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
             state.note("holiday.jpg: a photo, a single still frame, with its own depth");
         });
     }
-    shot("depth", Theme::Dark, &|state| {
-        state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
-        state.panel = false;
-    });
-    shot("coc", Theme::Light, &|state| {
-        state.legend = Some(Legend::Coc { max_px: 43.0 });
-        state.panel = false;
-    });
-    shot("bins", Theme::Dark, &|state| {
-        let mut high_px = [f32::INFINITY; crate::views::MAX_BINS];
-        high_px[..4].copy_from_slice(&[-9.0, -2.5, 2.0, 11.5]);
-        state.legend = Some(Legend::Bins { count: 5, high_px });
-        state.instruments = true;
-        state.meters.fill_with_samples();
-    });
     let mut seen = Seen::new(Theme::Dark, size, |state| {
         state.look.aperture.shape =
             bokehcam::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 10.0, curvature: 0.2 };
@@ -212,10 +193,6 @@ fn text_can_be_read_over_any_picture() {
             for (name, text) in texts {
                 let contrast = contrast(solid(text), card);
                 assert!(contrast >= 4.5, "{theme:?} {name} over {picture}: {contrast}");
-            }
-            for quality in [None].into_iter().chain(bokehcam::budget::Quality::ALL.map(Some)) {
-                let contrast = contrast(solid(quality_color(quality, theme).0), card);
-                assert!(contrast >= 4.5, "{theme:?} {quality:?} over {picture}: {contrast}");
             }
         }
         for (name, text, behind) in [

@@ -4,25 +4,20 @@ use egui::Rect;
 
 use super::{Window, sample};
 use crate::state::{self, Output, Source, State};
-use crate::views::Legend;
 use bokehcam::look::Effect;
 
 fn states() -> Vec<State> {
     let base = sample::state();
     let mut all = vec![base.clone()];
     let mut full = base.clone();
-    full.meters.fill_with_samples();
-    (full.instruments, full.help, full.split) = (true, true, Some(0.5));
-    full.legend = Some(Legend::Depth { near_m: 0.5, far_m: 0.50001 });
+    (full.help, full.split) = (true, Some(0.5));
     full.note("A long line for the person ".repeat(30));
     all.push(full);
     let mut tilt = base.clone();
     (tilt.look.effect, tilt.mirror, tilt.source) = (Effect::TiltShift, true, sample::running(false));
-    tilt.legend = Some(Legend::Coc { max_px: 0.0 });
     all.push(tilt);
     let mut off = base.clone();
-    (off.look.effect, off.shown, off.source) = (Effect::None, state::ViewMode::Bins, Source::Lost("why ".repeat(200)));
-    off.legend = Some(Legend::Bins { count: 13, high_px: [f32::INFINITY; 13] });
+    (off.look.effect, off.shown, off.source) = (Effect::None, state::ViewMode::Depth, Source::Lost("why ".repeat(200)));
     off.focus_m = Some(f32::INFINITY);
     all.push(off);
     let mut empty = State::new(sample::look(), String::new());
@@ -178,24 +173,4 @@ fn a_canvas_without_pixels_is_no_picture() {
     let mut window = Window::new();
     window.canvas = crate::panel::Canvas::default();
     assert!(window.click(egui::pos2(200.0, 200.0)).is_empty());
-}
-
-#[test]
-fn in_the_instruments_no_text_runs_over_another() {
-    for text_scale in [1.0, 1.6] {
-        let mut state = sample::state();
-        (state.instruments, state.panel, state.preferences.text_scale) = (true, false, text_scale);
-        state.meters.fill_with_samples();
-        let mut window = Window::of(state, (1280, 720));
-        window.wait(0.5);
-        let texts = window.boxes();
-        for wanted in ["150 of 300:", "every 2nd frame", "Play-out delay", "Between stages"] {
-            assert!(texts.iter().any(|(text, _)| text.contains(wanted)), "{wanted}: {texts:?}");
-        }
-        let over = |a: &Rect, b: &Rect| a.shrink(0.5).intersects(b.shrink(0.5));
-        for (k, (text, at)) in texts.iter().enumerate() {
-            let under = texts[..k].iter().find(|(_, other)| over(at, other));
-            assert!(under.is_none(), "{text} at {at} runs over {under:?}");
-        }
-    }
 }

@@ -1,11 +1,10 @@
-//! Zooming: by keys, wheel and pinch; dragging and clicking the zoomed picture; and the probe under the pointer.
+//! Zooming: by keys, wheel and pinch; dragging and clicking the zoomed picture.
 
-use egui::{Event, Key, Modifiers, Pos2, pos2};
+use egui::{Event, Key, Modifiers, pos2};
 
-use super::super::super::state::{Action, ViewMode, Zoom};
+use super::super::super::state::{Action, Zoom};
 use super::{Window, button, close, point, scrolled};
 use crate::present::zoomed_area;
-use crate::views::Probe;
 
 /// Lays the picture out as the window does.
 fn place(window: &mut Window) {
@@ -144,33 +143,4 @@ fn the_split_line_is_where_the_picture_is_split() {
     window.pass(vec![button(pos2(2.0, 300.0), true)]);
     window.pass(vec![button(pos2(2.0, 300.0), false)]);
     assert_eq!(window.state.split, Some(0.1));
-}
-
-#[test]
-fn depth_and_blur_under_the_pointer_are_shown_where_one_looks_into_them() {
-    let mut window = Window::new();
-    window.state.panel = false;
-    let at: Pos2 = pos2(320.0, 180.0);
-    window.pass(vec![Event::PointerMoved(at)]);
-    assert_eq!(window.panel.probed, None, "nothing disturbs the picture");
-    window.state.probe = Some(Probe { depth_m: Some(1.234), coc_px: 4.2 });
-    window.state.shown = ViewMode::Depth;
-    window.pass(Vec::new());
-    assert!(close(window.panel.probed.unwrap(), [0.25, 0.25]));
-    window.state.mirror = true;
-    window.pass(Vec::new());
-    assert!(close(window.panel.probed.unwrap(), [0.75, 0.25]));
-    let label = window.place_of("1.23 m, CoC +4.2 px").expect("what is there");
-    assert!(label.distance(at) < 150.0, "{label:?}");
-    window.state.probe = Some(Probe { depth_m: None, coc_px: -2.0 });
-    assert!(window.place_of("no depth, CoC −2.0 px").is_some());
-    window.state.camera.is_relative = true;
-    window.state.probe = Some(Probe { depth_m: Some(1.7), coc_px: 0.0 });
-    assert!(window.place_of("1.70 × the nearest, CoC +0.0 px").is_some(), "{:?}", window.texts());
-    // At the edge the label stays inside.
-    window.pass(vec![Event::PointerMoved(pos2(1275.0, 715.0))]);
-    let label = window.place_of("1.70 × the nearest, CoC +0.0 px").unwrap();
-    assert!(label.x < 1240.0 && label.y < 705.0, "{label:?}");
-    window.pass(vec![Event::PointerGone]);
-    assert!(window.place_of("1.70 × the nearest, CoC +0.0 px").is_none());
 }

@@ -210,7 +210,7 @@ impl App {
             sinks: ["window".to_owned()].into_iter().chain(outputs).collect(),
             watched: Some(state.is_watched),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
-            fps: if is_moving { state.meters.summary().fps } else { 0.0 },
+            fps: if is_moving { self.meters.frame_rate.per_second(self.clock.now_ns()) } else { 0.0 },
             look: Patch::describe(&state.look),
             ..Status::default()
         }

@@ -57,7 +57,7 @@ impl App {
         view.depth = depth.map(Pooled::detached);
         (view.coc, view.change, view.is_transitional, view.trace.quality) = (coc, change, false, quality);
         (self.state.focus_m, self.state.is_transitional) = (focus_distance_m(&coc), false);
-        self.drawn_view = None;
+        self.is_depth_drawn = false;
         if self.snapshot_due {
             self.save_snapshot();
         }
@@ -90,7 +90,6 @@ impl App {
             (None, true) => {
                 self.watch = Some(self.demand.watch());
                 self.last_frame_at = Instant::now();
-                self.state.meters.clear_recent();
             }
             (Some(_), false) => self.watch = None,
             (None, false) | (Some(_), true) => {}

@@ -3,6 +3,7 @@
 mod control;
 mod dropped_files;
 mod held_frame;
+mod meters;
 mod receive;
 mod render;
 mod seek;
@@ -21,12 +22,10 @@ use winit::window::WindowId;
 use super::gfx::Gfx;
 use super::saved_state::SavedState;
 use super::{Preview, PreviewOutcome, UserEvent, WindowError};
-use crate::meters::Totals;
 use crate::panel::{Panel, SystemFonts};
 use crate::session::{Session, SessionOutcome, Wake};
-use crate::state::{Action, Source, State, ViewMode};
-use crate::views::Views;
-use bokehcam::bokeh;
+use crate::state::{Action, Source, State};
+use crate::views::DepthView;
 use bokehcam::clock::Clock;
 use bokehcam::compute::device::Device;
 use bokehcam::depth::plate::Guide;
@@ -34,10 +33,7 @@ use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{OutputRequest, View};
-use bokehcam::stats::WindowStats;
 
-/// Layout interval of the instruments while frames arrive.
-const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
 /// Maximum interval of polling the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(250);
 
@@ -62,21 +58,20 @@ pub(super) struct App {
     view: Option<View>,
     /// Whether `view` has not been displayed yet.
     view_is_new: bool,
-    false_colors: Views,
-    /// The view that `false_colors` drew last; `None` after a new frame.
-    drawn_view: Option<ViewMode>,
+    depth_view: DepthView,
+    /// Whether `depth_view` drew the depth of `view`.
+    is_depth_drawn: bool,
     /// Number of the held frame, and the highest number so far.
     held_number: Option<u64>,
     last_still_number: u64,
     /// Keeps the source running.
     watch: Option<Watch>,
     demand: Demand,
-    /// Settings of the current look's blur.
-    settings: Option<bokeh::Settings>,
     blank_picture: ColorImage,
     /// The still card, shown while the picture is off.
     card: ColorImage,
     clock: Clock,
+    meters: meters::Meters,
     /// Time of the last frame, or of opening its source.
     last_frame_at: Instant,
     /// Time of the next layout of the controls, and of the last one.
@@ -106,7 +101,7 @@ pub(super) struct App {
 impl App {
     /// Starts the session immediately, so that the source opens in parallel with the window.
     pub fn new(preview: Preview, proxy: EventLoopProxy<UserEvent>) -> Result<Self, WindowError> {
-        let Preview { mut state, session, theme, device, close_at_end, saved_state, saved_state_file, control, stop } =
+        let Preview { state, session, theme, device, close_at_end, saved_state, saved_state_file, control, stop } =
             preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
@@ -124,7 +119,6 @@ impl App {
         let start = |control| control::RemoteControl::start(control, session.shutter(), &proxy);
         let remote_control = control.map(start).transpose()?;
         let clock = Clock::system();
-        state.meters.set_start(clock.now_ns());
         let ctx = egui::Context::default();
         let fonts = user_events::init_appearance(&ctx, theme, &proxy);
         Ok(Self {
@@ -144,15 +138,15 @@ impl App {
             seek_state: seek::SeekState::default(),
             view: None,
             view_is_new: false,
-            false_colors: Views::default(),
-            drawn_view: None,
+            depth_view: DepthView::default(),
+            is_depth_drawn: false,
             held_number: None,
             last_still_number: 0,
             watch: Some(demand.watch()),
             demand,
-            settings: None,
             blank_picture: ColorImage::new(16, 9),
             card: ColorImage::new(0, 0),
+            meters: meters::Meters::new(clock.now_ns()),
             clock,
             last_frame_at: Instant::now(),
             layout_at: Some(Instant::now()),
@@ -174,7 +168,7 @@ impl App {
 
     /// Closes the window and then the session, and adds display statistics to the report.
     pub fn finish(self) -> Result<PreviewOutcome, WindowError> {
-        let Self { gfx, view, frames, session, state, failed, remote_control, .. } = self;
+        let Self { gfx, view, frames, session, state, meters, failed, remote_control, .. } = self;
         // Stops remote control first.
         drop(remote_control);
         // Closes the window immediately; completing the outputs may take a while.
@@ -184,7 +178,7 @@ impl App {
         // dropped.
         drop(frames);
         if let Some(report) = &mut report {
-            report.window = Some(window_use(&state));
+            report.window = Some(meters.stats());
         }
         let source_error = match state.source {
             Source::Lost(why) => Some(why),
@@ -199,13 +193,6 @@ impl App {
         }
     }
 
-    fn update_settings(&mut self) {
-        self.settings = match &self.state.source {
-            Source::Running(running) => self.state.look.blur_settings(running.size, true),
-            _ => None,
-        };
-    }
-
     fn on_input(&mut self) {
         let now = Instant::now();
         if !self.is_hidden() {
@@ -214,11 +201,6 @@ impl App {
         self.layout_at = Some(now);
         self.request_redraw();
     }
-}
-
-fn window_use(state: &State) -> WindowStats {
-    let Totals { presented, first_frame_ns, latency, reaction, present } = &state.meters.totals;
-    WindowStats::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 
 impl ApplicationHandler<UserEvent> for App {
@@ -249,9 +231,7 @@ impl ApplicationHandler<UserEvent> for App {
         let Some(gfx) = &mut self.gfx else { return };
         match &event {
             WindowEvent::RedrawRequested => {
-                let due =
-                    self.state.instruments && self.view_is_new && self.laid_out_at.elapsed() >= INSTRUMENTS_PERIOD;
-                if due || self.layout_at.is_some_and(|at| at <= Instant::now()) {
+                if self.layout_at.is_some_and(|at| at <= Instant::now()) {
                     self.lay_out(events);
                 }
                 return self.draw(events);

@@ -32,7 +32,6 @@ impl App {
                     // A pending snapshot was meant for the previous source.
                     self.snapshot_due = false;
                     self.frames = Some(frames);
-                    self.state.meters.clear_recent();
                 }
                 SessionEvent::Reblurred(blurred) => changed |= self.show_reblurred(*blurred),
                 SessionEvent::Copy(text) => {
@@ -49,7 +48,6 @@ impl App {
             }
         }
         if changed {
-            self.update_settings();
             self.layout_at = Some(Instant::now());
             self.update_output_request();
             self.set_title();
@@ -83,7 +81,7 @@ impl App {
             // The new frame must be held anew.
             self.held_number = None;
             self.view = Some(view);
-            self.view_is_new = true;
+            (self.view_is_new, self.is_depth_drawn) = (true, false);
             changed = true;
             if self.snapshot_due {
                 self.save_snapshot();

@@ -10,8 +10,7 @@ use super::{App, control};
 use crate::panel::{self, Canvas};
 use crate::present::{Area, Controls, Drawing, Image};
 use crate::session::SaveOptions;
-use crate::state::{Action, Request, Source, State};
-use crate::views::Probe;
+use crate::state::{Action, Request, Source, State, ViewMode};
 use bokehcam::compute::PictureLocation;
 use bokehcam::frame::ColorImage;
 use bokehcam::sink::card;
@@ -62,11 +61,6 @@ impl App {
         self.laid_out_at = Instant::now();
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         self.layout_at = self.laid_out_at.checked_add(wait);
-        let probe = self.panel.probed.and_then(|at| Some(Probe::read(self.view.as_ref()?, at)));
-        if std::mem::replace(&mut self.state.probe, probe) != probe {
-            self.layout_at = Some(self.laid_out_at);
-            gfx.window.request_redraw();
-        }
         // A change of the panel's size moves the picture and its overlays: lay out again.
         if panel::picture_area_px(&self.ctx) != available {
             self.layout_at = Some(self.laid_out_at);
@@ -101,7 +95,6 @@ impl App {
                         !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
                     self.update_held_frame();
                     self.session.send(Request::Look(look));
-                    self.update_settings();
                 }
                 other => self.session.send(other),
             }
@@ -143,20 +136,19 @@ impl App {
         self.session.save_frame(still, SaveOptions { with_sources: self.state.preferences.keep_sources, request });
     }
 
-    /// Presents the frame, or the selected view of it, below the controls of the last layout.
+    /// Presents the frame, or its depth, below the controls of the last layout.
     pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let hidden = self.is_hidden();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
-        let shown = self.state.shown;
-        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn_view != Some(shown)) {
-            self.false_colors.draw(shown, view, self.settings.as_ref());
-            self.drawn_view = Some(shown);
-            self.state.legend = self.false_colors.legend();
-        }
-        let false_colors = self.state.legend.map(|_| self.false_colors.image());
-        let State { mirror, split, source, .. } = &self.state;
+        let State { mirror, split, source, shown, .. } = &self.state;
         let view = self.view.as_ref();
+        let depth = view.and_then(|view| view.depth.as_deref()).filter(|_| *shown == ViewMode::Depth);
+        if let Some(depth) = depth.filter(|_| !self.is_depth_drawn) {
+            self.depth_view.draw(depth, size);
+            self.is_depth_drawn = true;
+        }
+        let depth = depth.map(|_| self.depth_view.image());
         // While off, the window shows the same card as the outputs.
         if self.state.off && self.card.size() != size {
             self.card = ColorImage::new(size.0, size.1);
@@ -174,7 +166,7 @@ impl App {
         let drawing = Drawing {
             area: if self.view.is_some() || self.state.off { area } else { Area::default() },
             visible_region,
-            picture: false_colors.map_or(picture, Image::Memory),
+            picture: depth.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,
             stale: self.state.silent_s.is_some() || !matches!(source, Source::Running(_) | Source::Opening),
@@ -193,10 +185,10 @@ impl App {
         let now_ns = self.clock.now_ns();
         // Counts each frame once, even if it is drawn repeatedly.
         if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.view_is_new)) {
-            self.state.meters.add_frame(view, now_ns, now_ns - began_ns);
+            self.meters.add_frame(view.captured_ns, now_ns, now_ns - began_ns);
         }
         if let Some(input_at) = self.input_at.take() {
-            self.state.meters.add_reaction(input_at.elapsed().as_nanos() as u64);
+            self.meters.reaction.add(input_at.elapsed().as_nanos() as u64);
         }
     }
 }
