@@ -8,11 +8,11 @@
 // Internal to the program: public items are documented only where their names do not suffice.
 #![allow(missing_docs)]
 
-pub mod dialog;
+mod dialog;
 pub mod keys;
 pub mod panel;
 pub mod present;
-pub mod remote_changes;
+mod remote_changes;
 pub mod services;
 pub mod session;
 pub mod state;

@@ -11,7 +11,7 @@ use bokehcam::look::Effect;
 use bokehcam::look::Look;
 
 /// Duration of the ring at a click, in seconds.
-pub const CLICK_RING_S: f64 = 0.9;
+const CLICK_RING_S: f64 = 0.9;
 /// Scroll distance that doubles the blur, in points.
 const WHEEL_TO_DOUBLE: f32 = 300.0;
 /// Zoom gesture per zoom step, as a power of two: a pinch of this factor, or a notch of Ctrl+wheel.

@@ -202,7 +202,7 @@ fn create_visuals(theme: Theme, colors: &Colors) -> Visuals {
 }
 
 /// Returns the same colour, fully opaque.
-pub fn to_opaque(color: Color32) -> Color32 {
+fn to_opaque(color: Color32) -> Color32 {
     let [r, g, b, _] = color.to_srgba_unmultiplied();
     Color32::from_rgb(r, g, b)
 }

@@ -17,13 +17,12 @@ const NUMBER_WIDTH: f32 = 70.0;
 /// A labelled number with a slider.
 #[derive(Clone)]
 pub struct Number<'a> {
-    label: &'a str,
+    pub label: &'a str,
     /// Tooltip.
     hint: &'a str,
     range: RangeInclusive<f32>,
     /// Decimal places.
     digits: usize,
-    /// Whether the slider is logarithmic.
     logarithmic: bool,
     /// Prefix and suffix of the number.
     affixes: [&'a str; 2],
@@ -43,10 +42,6 @@ impl<'a> Number<'a> {
     /// Makes the slider logarithmic.
     pub fn logarithmic(self) -> Self {
         Self { logarithmic: true, ..self }
-    }
-
-    pub fn label(&self) -> &'a str {
-        self.label
     }
 }
 
@@ -69,8 +64,7 @@ impl Tooltip for Response {
 
 /// Adds a label, a number to drag or type, and a slider below them. Returns whether the number changed.
 pub fn add_number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
-    let Number { label, hint, ref range, digits, logarithmic, affixes: [before, after] } = *spec;
-    let label = tr(label);
+    let Number { label, hint, ref range, digits, logarithmic, .. } = *spec;
     let mut changed = false;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
@@ -79,40 +73,11 @@ pub fn add_number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
             let max_width = (ui.available_width() - NUMBER_WIDTH).max(20.0);
             let name = ui.scope(|ui| {
                 ui.set_max_width(max_width);
-                ui.add(Label::new(label).wrap())
+                ui.add(Label::new(tr(label)).wrap())
             });
             let name = name.inner.tooltip(hint);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
-                ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
-                // Dragging over 300 points, the panel's width, covers the range.
-                let per_point = (range.end() - range.start()) / 300.0;
-                // A value set elsewhere may lie outside the range; it stays until the user moves it.
-                let mut typed = *value;
-                let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
-                let drag = drag
-                    .speed(per_point)
-                    .update_while_editing(false)
-                    .max_decimals(digits)
-                    .min_decimals(digits)
-                    .custom_formatter(|number, _| format_number(number, digits))
-                    .prefix(before)
-                    .suffix(after);
-                // Accepts a decimal comma, as in 1,5.
-                let (ctx, shown) = (ui.ctx().clone(), f64::from(*value));
-                let drag = drag.custom_parser(|text| {
-                    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
-                    // Moving on with Tab re-enters the displayed value: that is no input.
-                    if (number - shown).abs() > 0.1f64.powi(digits as i32) {
-                        report_range(&ctx, spec, number);
-                    }
-                    Some(number)
-                });
-                let is_other = ui.add(drag).labelled_by(name.id).tooltip(hint).changed();
-                // Moving the keyboard focus re-enters the displayed, rounded value: that is no change.
-                if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
-                    (*value, changed) = (typed, true);
-                }
+                changed = add_drag_value(ui, spec, value, name.id)
             });
             name
         });
@@ -130,6 +95,42 @@ pub fn add_number(ui: &mut Ui, spec: &Number, value: &mut f32) -> bool {
         }
     });
     changed
+}
+
+/// Adds a number to drag or type, labelled by `name`. Returns whether it changed.
+fn add_drag_value(ui: &mut Ui, spec: &Number, value: &mut f32, name: Id) -> bool {
+    let Number { hint, ref range, digits, affixes: [before, after], .. } = *spec;
+    ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
+    ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
+    // Accepts a decimal comma, as in 1,5.
+    let (ctx, shown) = (ui.ctx().clone(), f64::from(*value));
+    let parse = |text: &str| {
+        let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+        // Moving on with Tab re-enters the displayed value: that is no input.
+        if (number - shown).abs() > 0.1f64.powi(digits as i32) {
+            report_range(&ctx, spec, number);
+        }
+        Some(number)
+    };
+    // A value set elsewhere may lie outside the range; it stays until the user moves it.
+    let mut typed = *value;
+    let drag = DragValue::new(&mut typed)
+        .range(range.clone())
+        .clamp_existing_to_range(false)
+        // Dragging over 300 points, the panel's width, covers the range.
+        .speed((range.end() - range.start()) / 300.0)
+        .update_while_editing(false)
+        .max_decimals(digits)
+        .min_decimals(digits)
+        .custom_formatter(|number, _| format_number(number, digits))
+        .custom_parser(parse)
+        .prefix(before)
+        .suffix(after);
+    let is_other = ui.add(drag).labelled_by(name).tooltip(hint).changed();
+    // Moving the keyboard focus re-enters the displayed, rounded value: that is no change.
+    let has_changed = is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32);
+    *value = if has_changed { typed } else { *value };
+    has_changed
 }
 
 /// Returns the key under which a message waits for the end of the pass.
@@ -308,8 +309,7 @@ pub fn set_accessible_name(control: &Response, name: &str, role: Role) {
 
 /// Adds a line of small explanatory text.
 pub fn add_remark(ui: &mut Ui, text: &str) {
-    let colors = Colors::for_ui(ui);
-    ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(colors.weak));
+    ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(Colors::for_ui(ui).weak));
 }
 
 /// Adds a path, shortened at its beginning because the end identifies the file.
@@ -319,7 +319,7 @@ pub fn add_path(ui: &mut Ui, path: &str) {
 }
 
 /// Returns the last `max_chars` characters of a text, the first of them replaced by an ellipsis if it is longer.
-pub fn truncate_start(text: &str, max_chars: usize) -> String {
+fn truncate_start(text: &str, max_chars: usize) -> String {
     match text.chars().count().checked_sub(max_chars) {
         None | Some(0) => text.to_owned(),
         Some(over) => ['…'].into_iter().chain(text.chars().skip(over + 1)).collect(),

@@ -52,39 +52,7 @@ impl PipelineRun {
         let (blurring, changes) = BlurSetup::create(look, (info.size, ADAPTIVE_QUALITY), |settings| {
             config.services.create_executor(settings, info.size)
         })?;
-        let executor = blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
-        let (budget_ns, threads) = (config.budget_ns.unwrap_or(info.period_ns), config.threads);
-        let sink = outputs.begin_source(info.size, info.period_ns);
-        let (view, views) = link::live();
-        let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), config.keep_going);
-        let (output_request, demand) = (Arc::clone(&config.output_request), config.demand.clone());
-        // Before the thread starts, so that the window can receive the first frame.
-        events.send(SessionEvent::RunStarted(views, guide.clone(), seeker));
-        let run = move || {
-            pipeline::run(Run {
-                threads,
-                pace: Pace::Realtime,
-                budget_ns,
-                keep_going,
-                demand: Some(demand),
-                output_request: Some(output_request),
-                view: Some(view),
-                progress: &|_| wake(),
-                ..source.into_run(blurring, Destination::Lent(&mut *sink.lock()), &stopped)
-            })
-        };
-        let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
-            let result = run();
-            let report = match &result {
-                Ok(report) => report.clone(),
-                Err(failed) => (*failed.report).clone(),
-            };
-            ended(result);
-            Some(report)
-        });
-        let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
-        let source = Source::Running(Running {
+        let running = Running {
             name,
             label: info.name,
             size: info.size,
@@ -95,10 +63,38 @@ impl PipelineRun {
             depth_from,
             depth_methods,
             depth_method,
-            executor,
+            executor: blurring.bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe()),
+        };
+        let (budget_ns, threads) = (config.budget_ns.unwrap_or(info.period_ns), config.threads);
+        let sink = outputs.begin_source(info.size, info.period_ns);
+        let (view, views) = link::live();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&events.wake), config.keep_going);
+        let (output_request, demand) = (Arc::clone(&config.output_request), config.demand.clone());
+        // Before the thread starts, so that the window can receive the first frame.
+        events.send(SessionEvent::RunStarted(views, guide.clone(), seeker));
+        let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
+            let result = pipeline::run(Run {
+                threads,
+                pace: Pace::Realtime,
+                budget_ns,
+                keep_going,
+                demand: Some(demand),
+                output_request: Some(output_request),
+                view: Some(view),
+                progress: &|_| wake(),
+                ..source.into_run(blurring, Destination::Lent(&mut *sink.lock()), &stopped)
+            });
+            let report = match &result {
+                Ok(report) => report.clone(),
+                Err(failed) => (*failed.report).clone(),
+            };
+            ended(result);
+            Some(report)
         });
+        let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
         let pipeline_run = Self { size: info.size, source_depth, changes, stop, guide, thread };
-        Ok((pipeline_run, source))
+        Ok((pipeline_run, Source::Running(running)))
     }
 
     /// Returns the look as far as the source supports it.

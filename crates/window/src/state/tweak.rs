@@ -1,6 +1,5 @@
 //! Incremental changes of a look by keys or the wheel.
 
-use bokehcam::bokeh::Rank;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use bokehcam::optics::Lens;
@@ -148,20 +147,11 @@ pub fn focus_on_tracked(x: f32, y: f32) -> FocusRule {
 }
 
 /// Rounds to four significant digits: finer steps are invisible, and commands stay short.
-pub fn round_significant(value: f32) -> f32 {
+fn round_significant(value: f32) -> f32 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// Returns an angle plus `by_deg`, wrapped to -90 to 90 degrees: rotating a band by 180 degrees changes nothing.
 pub fn rotate_band(angle_deg: f32, by_deg: f32) -> f32 {
     (angle_deg + by_deg + 90.0).rem_euclid(180.0) - 90.0
-}
-
-/// Returns the label for a number of separable terms; `None` is chosen by the quality level.
-pub fn rank_label(rank: Option<Rank>) -> String {
-    match rank {
-        None => "auto".into(),
-        Some(Rank::Terms(terms)) => terms.to_string(),
-        Some(Rank::Full) => "full".into(),
-    }
 }

@@ -11,7 +11,7 @@ use crate::texts::{tr, tr_with};
 use bokehcam::look::{Effect, MAX_COC_PER_HEIGHT};
 
 /// Name of the section with all other settings.
-pub const MORE: &str = "More";
+const MORE: &str = "More";
 
 /// Draws the controls in `columns` columns.
 pub fn show(ui: &mut Ui, form: &mut PanelForm, columns: usize) {

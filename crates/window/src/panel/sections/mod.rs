@@ -52,7 +52,7 @@ impl PanelForm<'_> {
     fn add_number(&mut self, ui: &mut Ui, how: &Number<'static>, mut value: f32, set: impl FnOnce(&mut Look, f32)) {
         if add_number(ui, how, &mut value) {
             set(&mut self.look, value);
-            self.stroke = Some(how.label());
+            self.stroke = Some(how.label);
         }
     }
 

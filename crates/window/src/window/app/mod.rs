@@ -104,14 +104,7 @@ impl App {
         let Preview { state, session, theme, device, close_at_end, saved_state, saved_state_file, control, stop } =
             preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
-        let pending = Arc::clone(&wake_pending);
-        // Fails only if the event loop has ended.
-        let to_wake = proxy.clone();
-        let wake: Wake = Arc::new(move || {
-            if !pending.swap(true, Ordering::AcqRel) {
-                let _ = to_wake.send_event(UserEvent::Session);
-            }
-        });
+        let wake = create_wake(Arc::clone(&wake_pending), proxy.clone());
         let off = Arc::clone(&session.off);
         let (output_request, demand) = (Arc::clone(&session.output_request), session.demand.clone());
         let session = Session::start(session, wake)?;
@@ -201,6 +194,16 @@ impl App {
         self.layout_at = Some(now);
         self.request_redraw();
     }
+}
+
+/// Returns a function that wakes the event loop unless a wake-up is `pending` already.
+fn create_wake(pending: Arc<AtomicBool>, proxy: EventLoopProxy<UserEvent>) -> Wake {
+    Arc::new(move || {
+        if !pending.swap(true, Ordering::AcqRel) {
+            // Fails only if the event loop has ended.
+            let _ = proxy.send_event(UserEvent::Session);
+        }
+    })
 }
 
 impl ApplicationHandler<UserEvent> for App {

@@ -22,30 +22,7 @@ impl App {
         self.wake_pending.swap(false, Ordering::AcqRel);
         let mut changed = false;
         while let Some(event) = self.session.try_recv_event() {
-            match event {
-                SessionEvent::RunStarted(frames, guide, seeker) => {
-                    self.guide = guide;
-                    (self.seek_state, self.state.transport, self.state.shows_final_photo) =
-                        (SeekState::new(seeker), None, false);
-                    changed |= self.state.set_plate_step(None);
-                    self.last_frame_at = Instant::now();
-                    // A pending snapshot was meant for the previous source.
-                    self.snapshot_due = false;
-                    self.frames = Some(frames);
-                }
-                SessionEvent::Reblurred(blurred) => changed |= self.show_reblurred(*blurred),
-                SessionEvent::Copy(text) => {
-                    if let Some(gfx) = &mut self.gfx {
-                        gfx.input.set_clipboard_text(text);
-                    }
-                }
-                SessionEvent::Update(update) => {
-                    if let Some(look) = self.state.apply_update(update) {
-                        self.session.send(look);
-                    }
-                    changed = true;
-                }
-            }
+            changed |= self.handle_session_event(event);
         }
         if changed {
             self.layout_at = Some(Instant::now());
@@ -55,6 +32,46 @@ impl App {
                 events.exit();
             }
         }
+        changed |= self.take_newest_frame();
+        self.update_held_frame();
+        self.update_watch();
+        if changed {
+            self.request_redraw();
+        }
+    }
+
+    /// Handles an event of the session. Returns whether it changed what is shown.
+    fn handle_session_event(&mut self, event: SessionEvent) -> bool {
+        match event {
+            SessionEvent::RunStarted(frames, guide, seeker) => {
+                self.guide = guide;
+                (self.seek_state, self.state.transport, self.state.shows_final_photo) =
+                    (SeekState::new(seeker), None, false);
+                self.last_frame_at = Instant::now();
+                // A pending snapshot was meant for the previous source.
+                self.snapshot_due = false;
+                self.frames = Some(frames);
+                self.state.set_plate_step(None)
+            }
+            SessionEvent::Reblurred(blurred) => self.show_reblurred(*blurred),
+            SessionEvent::Copy(text) => {
+                if let Some(gfx) = &mut self.gfx {
+                    gfx.input.set_clipboard_text(text);
+                }
+                false
+            }
+            SessionEvent::Update(update) => {
+                if let Some(look) = self.state.apply_update(update) {
+                    self.session.send(look);
+                }
+                true
+            }
+        }
+    }
+
+    /// Takes the newest frame. Returns whether it changed what is shown.
+    fn take_newest_frame(&mut self) -> bool {
+        let mut changed = false;
         // Discards frames that were in flight when the picture was switched off.
         let newest = self.frames.as_mut().and_then(Receiver::try_recv).filter(|_| !self.state.off);
         if newest.is_some() {
@@ -87,10 +104,6 @@ impl App {
                 self.save_snapshot();
             }
         }
-        self.update_held_frame();
-        self.update_watch();
-        if changed {
-            self.request_redraw();
-        }
+        changed
     }
 }
