@@ -17,7 +17,8 @@ pub fn show_offer(stack: &mut CardStack, state: &State, actions: &mut Vec<Action
     if !state.offers_depth_methods() || state.controls_hidden {
         return;
     }
-    let network = ("Find me with a small network", "It separates a person from the background", Action::SegmentPerson);
+    let by_network = Action::SetDepthMethod(DepthMethod::Person);
+    let network = ("Find me with a small network", "It separates a person from the background", by_network);
     let plate =
         ("Show me the empty room", "Step out for four seconds; the camera must not move (T)", Action::CapturePlate);
     let plate = Some(plate).filter(|_| state.can_capture_plate());

@@ -58,7 +58,6 @@ impl PipelineRun {
             size: info.size,
             period_ns: info.period_ns,
             has_depth,
-            is_live: info.live,
             kind,
             depth_from,
             depth_methods,

@@ -101,8 +101,6 @@ pub enum Action {
     CapturePlate,
     /// Captures it although a person seems to be there.
     CapturePlateAnyway,
-    /// Gets depth from person segmentation.
-    SegmentPerson,
     /// Declines the offered depth methods.
     DeclineDepthOffer,
     /// Switches blur by depth on or off.

@@ -1,6 +1,6 @@
 //! Applies actions to the state.
 
-use super::{Action, DepthMethod, Output, Request, Source, State, ViewMode};
+use super::{Action, Output, Request, Source, State, ViewMode};
 use bokehcam::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and the source has none.
@@ -100,7 +100,6 @@ impl State {
             Action::CapturePlate => self.note(NO_PLATE),
             Action::CapturePlateAnyway => return vec![Request::CapturePlateAnyway],
             Action::DeclineDepthOffer => self.depth_offer_declined = true,
-            Action::SegmentPerson => return vec![Request::SetDepthMethod(DepthMethod::Person)],
             Action::SetDepthMethod(depth_method) => return vec![Request::SetDepthMethod(depth_method)],
             Action::Portrait(on) => return self.set_portrait(on),
             Action::Refresh => return vec![Request::Refresh],

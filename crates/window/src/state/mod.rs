@@ -71,8 +71,6 @@ pub struct Running {
     pub period_ns: u64,
     /// Whether its frames have depth.
     pub has_depth: bool,
-    /// Whether frames arrive in real time, as from a camera; other sources can be paused.
-    pub is_live: bool,
     /// Kind of source; a photo is a single still frame.
     pub kind: Kind,
     /// Origin of its depth.

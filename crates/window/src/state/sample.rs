@@ -25,7 +25,6 @@ pub fn running(has_depth: bool) -> Source {
         size: (1280, 720),
         period_ns: 33_333_333,
         has_depth,
-        is_live: true,
         kind: Kind::Camera,
         depth_from: if has_depth { DepthOrigin::Metres } else { DepthOrigin::Nothing },
         depth_methods: if has_depth { vec![DepthMethod::Measured] } else { vec![DepthMethod::Plate] },

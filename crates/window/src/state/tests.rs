@@ -114,7 +114,7 @@ fn of_presets_that_look_the_same_the_one_that_was_chosen_is_in_use() {
 fn a_photo_is_told_what_gives_it_depth() {
     let mut state = state();
     let Source::Running(camera) = running(false) else { unreachable!() };
-    let photo = Source::Running(Running { kind: Kind::Photo, is_live: false, ..camera.clone() });
+    let photo = Source::Running(Running { kind: Kind::Photo, ..camera.clone() });
     for (source, hint) in [(Source::Running(camera), NO_DEPTH), (photo, NO_DEPTH_OF_PHOTO)] {
         state.apply_update(Update::Source(source));
         state.apply(Action::Show(ViewMode::Depth));

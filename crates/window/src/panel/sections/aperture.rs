@@ -41,7 +41,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm, thumbnails: &mut Thumbnails) {
     };
     if changed {
         form.look.aperture.shape = shape;
-        form.mark_changed(true, "aperture");
+        form.stroke = Some("aperture");
     }
     let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
     let (intensity, rim, highlights) = (form.look.aperture.intensity, form.look.rim, form.look.highlights);
@@ -83,7 +83,7 @@ fn shape_row(ui: &mut Ui, form: &mut PanelForm, thumbnails: &mut Thumbnails) {
     });
     if let Some(aperture) = shapes.selection(ui) {
         form.look.aperture = aperture;
-        form.mark_changed(true, "shape");
+        form.stroke = Some("shape");
     }
 }
 

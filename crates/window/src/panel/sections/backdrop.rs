@@ -59,7 +59,7 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
             (BackgroundKind::File, None) => form.push_action(Action::Browse(PathKind::Background)),
             (BackgroundKind::Transparent, _) => {}
         }
-        form.mark_changed(true, "behind");
+        form.stroke = Some("behind");
     }
 }
 
@@ -78,7 +78,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.tooltip("Another colour").changed() {
                 form.look.background = Background::Color(color);
-                form.mark_changed(true, "colour behind");
+                form.stroke = Some("colour behind");
             }
         })),
     }

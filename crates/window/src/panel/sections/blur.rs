@@ -31,7 +31,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
             }
             _ => {}
         }
-        form.mark_changed(chosen.is_some(), "blur by");
+        form.stroke = chosen.map(|_| "blur by").or(form.stroke);
     }
     match form.look.strength {
         Strength::Lens(lens) => lens_numbers(ui, form, lens),

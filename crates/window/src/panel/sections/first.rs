@@ -83,7 +83,7 @@ fn add_blur_slider(ui: &mut Ui, form: &mut PanelForm) {
             .changed()
         {
             tweak::set_blur_fraction(&mut form.look, percent / 100.0, focus_m, form.size);
-            form.mark_changed(true, "Amount of blur");
+            form.stroke = Some("Amount of blur");
         }
     });
 }

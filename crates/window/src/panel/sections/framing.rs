@@ -17,7 +17,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let hint = "Recordings and calls show a part of the picture, with the subject in the middle";
     if add_switch(ui, "Follow the subject", hint, zoom.is_some()) {
         form.look.follow = if zoom.is_some() { FramingZoom::OFF } else { FramingZoom::from_zoom(DEFAULT_ZOOM) };
-        form.mark_changed(true, "follow");
+        form.stroke = Some("follow");
     }
     // `zoom` is from before the click, so the slider appears in the next pass.
     if let Some(zoom) = zoom {

@@ -37,13 +37,6 @@ pub struct PanelForm<'a> {
 }
 
 impl PanelForm<'_> {
-    /// Records that the control `stroke` changed the look, if `has_changed`.
-    fn mark_changed(&mut self, has_changed: bool, stroke: &'static str) {
-        if has_changed {
-            self.stroke = Some(stroke);
-        }
-    }
-
     fn push_action(&mut self, action: Action) {
         self.actions.push(action);
     }

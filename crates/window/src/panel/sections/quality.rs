@@ -18,6 +18,6 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
     if let Some(quality) = add_dropdown(ui, "Quality", &name(quality), levels, &quality) {
         form.look.quality = quality;
-        form.mark_changed(true, "quality");
+        form.stroke = Some("quality");
     }
 }

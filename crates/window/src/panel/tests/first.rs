@@ -90,7 +90,7 @@ fn without_depth_the_switch_asks_how_it_may_be_known() {
     window.click_on("Portrait");
     assert_eq!((window.state.look.effect, window.state.offers_depth_methods()), (Effect::Blur, true));
     window.wait(0.1);
-    assert_eq!(window.click_on("Find me with a small network"), [Action::SegmentPerson]);
+    assert_eq!(window.click_on("Find me with a small network"), [Action::SetDepthMethod(DepthMethod::Person)]);
     assert_eq!(window.click_on("Show me the empty room"), [Action::CapturePlate]);
     window.press(Key::Escape, Modifiers::NONE);
     assert!(window.state.depth_offer_declined && window.state.panel, "Esc closes the question alone");
