@@ -1,10 +1,12 @@
-//! Checks a focus in metres against the distances of a depth map.
+//! Checks the distances of a depth map: their unit, and a focus among them.
 
 use super::log;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::{CocRule, Look};
 use bokehcam::optics::{CocField, DepthCoc};
+use bokehcam::source::DepthOrigin;
+use bokehcam::source::options::DEPTH_SCALE;
 
 /// Says that the number of a focus is `taken` as a place in relative depth.
 pub fn note_place(given: &Look, taken: &Look) {
@@ -18,9 +20,24 @@ const MIN_BLURRED_FRACTION: f32 = 0.99;
 /// CoC radius up to which a pixel is sharp, in pixels.
 const MAX_SHARP_PX: f32 = 1.0;
 
-/// Warns of a focus in metres that nothing in `map` is near, and of a map without known depth; `in_units` is true if
-/// `--depth-scale` converts it to metres. `size` is that of the picture, in pixels.
-pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bool) {
+/// If all depth is nearer than this, in metres, it has another unit than assumed.
+const MIN_FAR_M: f32 = 1.0;
+
+/// Warns of depth in another unit than assumed, or of a focus in metres that nothing in `map` is near. `scale` is that
+/// of `--depth-scale`, if any, and `size` that of the picture, in pixels.
+pub fn warn_of_distances(look: &Look, size: (u32, u32), map: &DepthMap, (from, scale): (DepthOrigin, Option<f32>)) {
+    let in_units = from == DepthOrigin::Units;
+    if in_units
+        && scale.is_none()
+        && let Some(far_m) = quantile_m(&mut known_metres(map), MIN_BLURRED_FRACTION)
+        && far_m < MIN_FAR_M
+    {
+        log::warn(&format!(
+            "at {DEPTH_SCALE} units per metre all depth is nearer than {far_m:.2} m; if it is in millimetres, add \
+             --depth-scale 1000"
+        ));
+        return;
+    }
     let (FocusRule::Metres(focus_m), CocRule::Depth { lens, range_m, max_coc_px, .. }) =
         (look.focus, look.coc_rule(size))
     else {
@@ -34,9 +51,18 @@ pub fn warn_of_focus(look: &Look, size: (u32, u32), map: &DepthMap, in_units: bo
     }
 }
 
+fn known_metres(map: &DepthMap) -> Vec<f32> {
+    map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect()
+}
+
+fn quantile_m(known: &mut [f32], fraction: f32) -> Option<f32> {
+    let index = (fraction * known.len().checked_sub(1)? as f32).round() as usize;
+    Some(*known.select_nth_unstable_by(index, f32::total_cmp).1)
+}
+
 /// Describes why nothing is sharp, if so.
 fn describe_out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
-    let mut known: Vec<f32> = map.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
+    let mut known = known_metres(map);
     if known.is_empty() {
         return Some("no depth is known anywhere".to_string());
     }
@@ -48,11 +74,8 @@ fn describe_out_of_focus(coc: &DepthCoc, map: &DepthMap) -> Option<String> {
         (_, before) if before >= MIN_BLURRED_FRACTION => "before",
         _ => return None,
     };
-    let mut quantile_m = |fraction: f32| {
-        let index = (fraction * (known.len() - 1) as f32).round() as usize;
-        *known.select_nth_unstable_by(index, f32::total_cmp).1
-    };
-    let (nearest_m, farthest_m) = (quantile_m(1.0 - MIN_BLURRED_FRACTION), quantile_m(MIN_BLURRED_FRACTION));
+    let nearest_m = quantile_m(&mut known, 1.0 - MIN_BLURRED_FRACTION)?;
+    let farthest_m = quantile_m(&mut known, MIN_BLURRED_FRACTION)?;
     Some(format!("the depth lies from {nearest_m:.3} to {farthest_m:.3} m, all of it {side} that, so nothing is sharp"))
 }
 

@@ -15,7 +15,6 @@ mod options;
 mod parse;
 #[doc(hidden)]
 pub mod parsers;
-mod plausible;
 mod report;
 mod screen;
 mod settings;

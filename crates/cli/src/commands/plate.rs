@@ -12,7 +12,6 @@ use crate::files::{
 };
 use crate::log;
 use crate::options;
-use crate::plausible;
 use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
 use crate::terminal::{self, Guidance};
@@ -78,8 +77,6 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &GivenSettin
     };
     if name.kind() == Kind::Photo {
         log::warn("a photo is a single picture: a person in it becomes part of the plate, and is not found");
-    } else {
-        plausible::warn_of_person_in_plate(&plate, to);
     }
     create_parent_folder(to)?;
     warn_of_leftovers([to.as_path()]);

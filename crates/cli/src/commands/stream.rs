@@ -17,8 +17,8 @@ use crate::controlled::{self, CommandLineRules};
 use crate::error::CliError;
 use crate::files::warn_of_leftovers;
 use crate::focus;
+use crate::log;
 use crate::options;
-use crate::plausible;
 use crate::report;
 use crate::settings::file::SettingsFile;
 use crate::settings::layers::GivenSettings;
@@ -38,7 +38,7 @@ use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, PipelineError, Run};
 use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
-use bokehcam::source::{self, DepthChoice, DepthOrigin, Source, SourceName};
+use bokehcam::source::{self, DepthChoice, Source, SourceName};
 use bokehcam::stats::Report;
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
@@ -153,10 +153,9 @@ impl Opened {
             window: false,
         };
         unused::warn_of_unused(&given.settings, &unused);
-        if !plausible::warn_of_source(&source, &look, &options)
-            && let Some(map) = source.first_depth.as_ref()
-        {
-            focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthOrigin::Units);
+        source.findings.notes.iter().for_each(|note| log::note(note));
+        if let Some(map) = source.first_depth.as_ref() {
+            focus::warn_of_distances(&look, info.size, map, (source.depth_from, options.depth.depth_scale));
         }
         Ok(Self { source, options, info, look, pace, unused })
     }

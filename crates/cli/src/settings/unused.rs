@@ -84,32 +84,18 @@ const NEEDS_OF_SOURCE: &[Requirement] = &[
 
 /// Other conditions.
 const NEEDS: &[Requirement] = &[
-    (&["depth-invalid"], |run| match run.depth {
-        DepthOrigin::Nothing => Some(NO_DEPTH),
-        DepthOrigin::Stereo | DepthOrigin::Networks | DepthOrigin::Plate => Some("there are no depth pictures"),
-        DepthOrigin::Units if !run.uses_depth => Some(DEPTH_UNUSED),
-        DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => None,
-    }),
+    (&["depth-invalid", "depth-unit"], needs_depth_pictures),
     (&["depth-scale"], |run| match run.depth {
-        DepthOrigin::Nothing => Some(NO_DEPTH),
-        DepthOrigin::Metres | DepthOrigin::Stereo => Some("this depth is already in metres"),
+        DepthOrigin::Metres => Some("this depth is already in metres"),
         DepthOrigin::Relative => Some("relative depth has no scale"),
-        DepthOrigin::Networks => Some("networks give no depth pictures"),
-        DepthOrigin::Plate => Some("a plate gives no depth pictures"),
-        DepthOrigin::Units if run.uses_depth => None,
-        DepthOrigin::Units => Some(DEPTH_UNUSED),
+        _ => needs_depth_pictures(run),
     }),
-    (&["depth-calibration"], |run| match (run.source, run.depth) {
-        (FrameOrigin::Picture | FrameOrigin::Bench | FrameOrigin::Source(Kind::Photo), _) => {
+    (&["depth-calibration"], |run| match run.source {
+        FrameOrigin::Picture | FrameOrigin::Bench | FrameOrigin::Source(Kind::Photo) => {
             Some("the map of a single picture shows its view")
         }
-        (FrameOrigin::Source(_), DepthOrigin::Units | DepthOrigin::Metres) if run.uses_depth => None,
-        (FrameOrigin::Source(_), _) => Some("depth does not come from a depth camera, or its recording"),
-    }),
-    (&["depth-unit"], |run| match run.depth {
-        DepthOrigin::Units | DepthOrigin::Relative | DepthOrigin::Metres => None,
-        DepthOrigin::Nothing => Some(NO_DEPTH),
-        _ => Some("depth does not come from depth pictures"),
+        _ if run.uses_depth && matches!(run.depth, DepthOrigin::Units | DepthOrigin::Metres) => None,
+        _ => Some("depth does not come from a depth camera, or its recording"),
     }),
     (&["depth-invert"], |run| {
         (run.depth != DepthOrigin::Relative).then_some("only inverse depth is inverted: add --depth-unit inverse")
@@ -120,29 +106,22 @@ const NEEDS: &[Requirement] = &[
     (&["network-runtime", "network-range", "network-order"], |run| {
         (run.depth != DepthOrigin::Networks).then_some("no network makes the depth")
     }),
-    (&["focus"], |run| if run.lens { None } else { needs_dof(run) }),
+    (&["focus"], |run| needs_dof(run).filter(|_| !run.lens)),
     (&["focus-range", "method"], needs_dof),
-    (
-        &["refine"],
-        |run| if run.source == FrameOrigin::Bench { Some("the scene's depth is exact") } else { needs_dof(run) },
-    ),
-    (&["background-memory"], |run| match (run.source, run.depth) {
-        (FrameOrigin::Picture | FrameOrigin::Bench, _) => Some("a single picture has nothing to remember"),
-        (_, DepthOrigin::Plate) => Some("the plate already shows the background"),
+    (&["refine", "behind"], |run| match run.source {
+        FrameOrigin::Bench => Some("the scene has its own background and exact depth"),
         _ => needs_dof(run),
     }),
-    (&["reuse"], |run| match run.source {
-        FrameOrigin::Picture | FrameOrigin::Bench => Some("every single picture is blurred from scratch"),
-        FrameOrigin::Source(_) => needs_blur(run),
+    (&["background-memory"], |run| match run.depth {
+        DepthOrigin::Plate => Some("the plate already shows the background"),
+        _ => needs_frames(run).or(needs_dof(run)),
     }),
-    (&["behind"], |run| if run.source == FrameOrigin::Bench { Some("the scene has its own") } else { needs_dof(run) }),
-    (&["follow"], |run| match run.source {
-        FrameOrigin::Picture | FrameOrigin::Bench => Some("a single picture is always shown whole"),
-        FrameOrigin::Source(_) => needs_dof(run),
-    }),
+    (&["follow"], |run| needs_frames(run).or(needs_dof(run))),
+    (&["reuse"], |run| needs_frames(run).or(needs_blur(run))),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
-    (&["blur", "f-number", "focal-length", "sensor-width"], |run| {
-        if run.source == FrameOrigin::Bench { Some("`bench` takes --coc") } else { needs_blur(run) }
+    (&["blur", "f-number", "focal-length", "sensor-width"], |run| match run.source {
+        FrameOrigin::Bench => Some("`bench` takes --coc"),
+        _ => needs_blur(run),
     }),
     (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], needs_blur),
     (&["backend"], needs_executor),
@@ -159,13 +138,24 @@ const NEEDS: &[Requirement] = &[
 const NO_DEPTH: &str = "there is no depth";
 const DEPTH_UNUSED: &str = "the effect does not use depth";
 
+/// Condition of settings of depth pictures: that there are some, and that the effect uses depth.
+fn needs_depth_pictures(run: &RunFacts) -> Option<&'static str> {
+    match run.depth {
+        DepthOrigin::Nothing => Some(NO_DEPTH),
+        DepthOrigin::Stereo | DepthOrigin::Networks | DepthOrigin::Plate => Some("there are no depth pictures"),
+        DepthOrigin::Units | DepthOrigin::Metres | DepthOrigin::Relative => (!run.uses_depth).then_some(DEPTH_UNUSED),
+    }
+}
+
 /// Condition of depth-of-field settings: an effect that uses depth.
 fn needs_dof(run: &RunFacts) -> Option<&'static str> {
-    match (run.effect, run.depth) {
-        (effect, _) if effect.follows_depth() => None,
-        (_, DepthOrigin::Nothing) => Some(NO_DEPTH),
-        _ => Some(DEPTH_UNUSED),
-    }
+    let why = if run.depth == DepthOrigin::Nothing { NO_DEPTH } else { DEPTH_UNUSED };
+    (!run.effect.follows_depth()).then_some(why)
+}
+
+/// Condition of settings that carry over from frame to frame.
+fn needs_frames(run: &RunFacts) -> Option<&'static str> {
+    (!matches!(run.source, FrameOrigin::Source(_))).then_some("a single picture is blurred from scratch, and whole")
 }
 
 /// Condition of blur settings: an effect that blurs.
@@ -252,25 +242,22 @@ fn format_as_given(setting: &Setting) -> String {
 
 /// Warns that everything is blurred equally for lack of depth; not for users who chose to do without.
 pub fn warn_of_no_depth(source: FrameOrigin) {
-    let fix = match source {
-        FrameOrigin::Picture => {
-            "`bokehcam models get` installs a network that finds people, --mask FILE marks the person, --depth-map \
-             FILE or a map NAME-depth.png beside NAME gives the depth"
-        }
-        FrameOrigin::Source(Kind::Photo) => {
-            "`bokehcam models get` installs a network that finds people, or a map NAME-depth.png beside NAME gives the \
-             depth"
-        }
+    const NETWORK: &str = "`bokehcam models get` installs a network that finds people, or ";
+    let (network, other) = match source {
+        FrameOrigin::Picture => (
+            NETWORK,
+            "--mask FILE marks the person, --depth-map FILE or a map NAME-depth.png beside NAME gives the depth",
+        ),
+        FrameOrigin::Source(Kind::Photo) => (NETWORK, "a map NAME-depth.png beside NAME gives the depth"),
         FrameOrigin::Source(Kind::Recording | Kind::Video) => {
-            "`bokehcam models get` installs a network that finds people, or --depth FOLDER uses the depth of another \
-             recording"
+            (NETWORK, "--depth FOLDER uses the depth of another recording")
         }
-        FrameOrigin::Source(Kind::Camera) => {
-            "`bokehcam models get` installs a network that finds people, or use --depth plate (step aside once)"
-        }
-        FrameOrigin::Source(_) | FrameOrigin::Bench => "--depth NAME uses a depth camera",
+        FrameOrigin::Source(Kind::Camera) => (NETWORK, "use --depth plate (step aside once)"),
+        FrameOrigin::Source(_) | FrameOrigin::Bench => ("", "--depth NAME uses a depth camera"),
     };
-    log::warn(&format!("{NO_DEPTH}, so everything is blurred: {fix}; --effect tilt-shift keeps a band sharp"));
+    log::warn(&format!(
+        "{NO_DEPTH}, so everything is blurred: {network}{other}; --effect tilt-shift keeps a band sharp"
+    ));
 }
 
 #[cfg(test)]
@@ -281,18 +268,6 @@ mod tests {
     fn setting(name: &str) -> Setting {
         Setting { name: name.to_owned(), value: Some("1".into()), origin: "flag", help: String::new() }
     }
-
-    const RUN: RunFacts = RunFacts {
-        source: FrameOrigin::Picture,
-        depth: DepthOrigin::Nothing,
-        uses_depth: false,
-        effect: Effect::Blur,
-        lens: false,
-        realtime: false,
-        cpu_only: false,
-        compresses: false,
-        window: false,
-    };
 
     #[test]
     fn every_name_in_the_table_is_a_setting_and_there_once() {
@@ -310,16 +285,19 @@ mod tests {
 
     #[test]
     fn a_setting_has_an_effect_where_what_it_needs_is_there() {
+        let blurred = RunFacts { effect: Effect::Blur, ..RunFacts::default() };
         let why = |name: &str, run: &RunFacts| find_unused(&[setting(name)], run).first().map(|(_, why)| *why);
-        assert_eq!(why("focus", &RUN), Some(NO_DEPTH));
-        assert_eq!(why("focus", &RunFacts { lens: true, ..RUN }), None);
-        let dof = RunFacts { depth: DepthOrigin::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
+        assert_eq!(why("focus", &blurred), Some(NO_DEPTH));
+        assert_eq!(why("focus", &RunFacts { lens: true, ..blurred }), None);
+        let dof = RunFacts { depth: DepthOrigin::Units, uses_depth: true, effect: Effect::Dof, ..blurred };
         for name in ["focus", "refine", "focus-range", "depth-scale", "method"] {
             assert_eq!(why(name, &dof), None, "{name}");
-            assert_eq!(why(name, &RunFacts { depth: DepthOrigin::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
+            assert_eq!(why(name, &RunFacts { depth: DepthOrigin::Nothing, ..blurred }), Some(NO_DEPTH), "{name}");
         }
         assert!(why("depth-scale", &RunFacts { depth: DepthOrigin::Stereo, ..dof }).is_some());
-        assert!(why("tilt", &dof).is_some() && why("tilt", &RunFacts { effect: Effect::TiltShift, ..RUN }).is_none());
+        assert!(
+            why("tilt", &dof).is_some() && why("tilt", &RunFacts { effect: Effect::TiltShift, ..blurred }).is_none()
+        );
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &RunFacts { realtime: true, ..dof }).is_none());
         assert!(why("rim", &RunFacts { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
         for (kind, is_unused) in [(Kind::Recording, false), (Kind::Demo, true), (Kind::Photo, true)] {

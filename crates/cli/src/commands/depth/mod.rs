@@ -12,7 +12,6 @@ use crate::error::CliError;
 use crate::files::{create_parent_folder, refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::log;
 use crate::options;
-use crate::plausible;
 use crate::terminal;
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::compute::Backend;
@@ -122,7 +121,6 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         rectifier.rectify_right(&std::mem::take(&mut right), &mut right);
         note("the pictures are rectified by the calibration: the result belongs to the rectified left picture".into());
     }
-    plausible::warn_of_baseline(geometry.map(|geometry| geometry.rig));
     let left = to_luma(&color);
     let disparities =
         command.resolve_disparity_range(geometry.and_then(|geometry| geometry.disparity_count), size.0, &note)?;

@@ -6,19 +6,18 @@ use std::sync::Arc;
 use super::RenderCommand;
 use crate::error::CliError;
 use crate::log;
-use crate::plausible;
 use bokehcam::depth::defocus;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
 use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
 use bokehcam::recording::mask_file::{self, MaskFile};
 use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::orientation::transform_photo;
 use bokehcam::source::photo::{self, PhotoDepth};
-use bokehcam::source::{self, DepthChoice, DepthOrigin};
+use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile};
 
 /// Input of the blur.
 pub(super) struct Input {
@@ -84,7 +83,7 @@ fn find_depth(image: &Path, command: &RenderCommand, look: &Look, input: &mut In
     notes.iter().for_each(|note| log::note(note));
     let Some(PhotoDepth { map, from, measured, by, original, focus }) = found else { return Ok(()) };
     if from == DepthOrigin::Networks {
-        plausible::warn_of_subject(None, &map, None);
+        warn_of_nobody(None, &map);
     }
     input.found = Some(FoundDepth { measured, by, focus });
     original.into_iter().for_each(|original| input.photo.replace_by_original(original));
@@ -112,7 +111,7 @@ fn compute_depth(
             let MaskFile { mask, notes } = mask_file::read(file, own_px)?;
             notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
             let mask = command.orientation.transform().apply_to_mask(&mask, own_px);
-            plausible::warn_of_mask(file, &mask, color);
+            warn_of_flat_mask(file, &mask);
             let outline = Outline {
                 grow_px: command.mask_grow,
                 feather_px: usize::from(command.mask_feather),
@@ -122,7 +121,7 @@ fn compute_depth(
         }
         (None, DepthChoice::SingleCamera(chosen)) => {
             let map = source::single_camera::compute_picture_depth(chosen, &command.source_options(), look, color)?;
-            plausible::warn_of_subject(Some(chosen), &map, command.image.as_deref());
+            warn_of_nobody(chosen.plate.as_ref(), &map);
             // Depth with a subject includes its matte; other depth has soft outlines and is refined.
             let depth = if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) };
             Ok(Some((depth, DepthOrigin::Networks)))
@@ -161,4 +160,30 @@ fn read_depth(
     }
     notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
     Ok((command.orientation.transform().transform_map(map, own_px), origin))
+}
+
+/// Warns of a mask that separates nothing.
+fn warn_of_flat_mask(file: &Path, mask: &Mask) {
+    let value = mask.alpha.first().copied().unwrap_or_default();
+    if mask.alpha.iter().all(|alpha| (alpha - value).abs() < 0.02) {
+        log::warn(&format!(
+            "{}: the mask is {value:.1} all over, from 0 (blurred) to 1 (sharp): it separates no subject from the background",
+            file.display()
+        ));
+    }
+}
+
+/// Warns if nobody is in front of the plate, or found by networks.
+fn warn_of_nobody(plate: Option<&PlateFile>, map: &DepthMap) {
+    let is_near = |subject_m: f32| map.metres.iter().any(|&metres| metres <= subject_m);
+    match (map.subject_m, plate) {
+        (None, _) => {}
+        (Some(subject_m), _) if is_near(subject_m) => {}
+        (_, Some(PlateFile::At(plate))) => log::warn(&format!(
+            "{}: nothing in the picture differs from the plate, so everything is blurred; a plate shows the place \
+             without the person",
+            plate.display()
+        )),
+        _ => log::warn("no person was found in the picture, so everything is blurred"),
+    }
 }

@@ -20,7 +20,6 @@ use crate::files::{
 use crate::focus;
 use crate::log;
 use crate::options;
-use crate::plausible;
 use crate::settings::layers::GivenSettings;
 use crate::settings::look;
 use crate::settings::unused;
@@ -195,8 +194,6 @@ fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result
     let adapted = source::adapt_look(&wanted, &command.blur.depth, known)?;
     focus::note_place(look, &adapted);
     let look = adapted;
-    plausible::warn_of_lens(&look);
-    plausible::warn_of_depth_scale(command.depth.depth_scale);
     command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
     let computing = command.computing.to_compute_options();
     let executor = blur::blur(&mut photo, depth, &look, &computing)?;
@@ -229,7 +226,6 @@ impl RenderCommand {
         (depth, depth_from, found): (Option<&Depth>, DepthOrigin, Option<&FoundDepth>),
         given: &GivenSettings,
     ) {
-        let in_units = depth_from == DepthOrigin::Units;
         let uses_depth = look.effect.follows_depth();
         unused::warn_of_unused(
             &given.settings,
@@ -251,31 +247,15 @@ impl RenderCommand {
             Some(_) if self.depth_map.is_some() && !uses_depth => {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
-            Some(Depth::Measured(map))
-                if self
-                    .depth_map
-                    .as_ref()
-                    .is_some_and(|file| self.warn_of_map(&file.display(), map, color, depth_from))
-                    || found
-                        .is_some_and(|found| found.measured && self.warn_of_map(&found.by, map, color, depth_from)) => {
+            Some(Depth::Measured(map) | Depth::Final(map)) => {
+                focus::warn_of_distances(look, color.size(), map, (depth_from, self.depth.depth_scale));
             }
-            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
         let map_name = self.depth_map.as_ref().map(|file| file.display().to_string());
         let file = map_name.or_else(|| found.filter(|found| found.measured).map(|found| found.by.clone()));
         if let (Some(Depth::Measured(map)), Some(file), true) = (depth, file, uses_depth) {
             report_misalignment(&file, look, map, color);
-        }
-    }
-}
-
-impl RenderCommand {
-    /// Warns of an implausible depth map; returns whether it did.
-    fn warn_of_map(&self, name: &dyn Display, map: &DepthMap, color: &ColorImage, from: DepthOrigin) -> bool {
-        match from {
-            DepthOrigin::Relative => plausible::warn_of_inverse(name, map, color),
-            from => plausible::warn_of_map(name, map, from != DepthOrigin::Units || self.depth.depth_scale.is_some()),
         }
     }
 }

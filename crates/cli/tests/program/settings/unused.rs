@@ -93,7 +93,7 @@ fn the_bench_says_what_it_has_no_use_for() {
     let args = ["bench", "--sizes", "32x24", "--frames", "1", "--backend", "cpu"];
     let bench = |more: &[&str]| Home::new().run(&[&args, more].concat());
     let ran = bench(&["--refine", "on", "--coc-at-infinity", "9"]);
-    assert!(ran.warning().contains("--refine on (the scene's depth is exact)"), "{}", ran.stderr);
+    assert!(ran.warning().contains("--refine on (the scene has its own background and exact depth)"), "{}", ran.stderr);
     assert!(ran.warning().contains("--blur 9 (`bench` takes --coc)"), "{}", ran.stderr);
     bench(&["--depth", "stereo"]).refused(2, &["--depth is for `stream`"]);
 }
