@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
 use super::files::refuse_overwriting_source;
-use super::options::Streaming;
+use super::options::{Stream, Streaming};
 use bokehcam::files::place;
 use bokehcam::look::BackgroundSetting;
 use bokehcam::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
@@ -61,16 +61,19 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
             return usage(format!("--to {target}: this is the source itself; use a separate virtual camera"));
         }
     }
-    if targets.contains(&Target::Filter) {
-        if source.pipewire_name().is_none() {
-            return usage(format!(
-                "--to filter: {source} is not a PipeWire camera; give it as pipewire:NAME, as listed by `bokehcam \
-                 devices`"
-            ));
-        }
-        if targets.contains(&Target::Window) {
-            return usage("--to filter: cannot be combined with a window, which keeps the camera open".to_string());
-        }
+    check_virtual_cameras(targets, stream, source)
+}
+
+/// Refuses a filter without its camera, and options of virtual cameras without one.
+fn check_virtual_cameras(targets: &[Target], stream: &Stream, source: &SourceName) -> Result<(), CliError> {
+    let usage = |text: String| Err(CliError::Usage(text));
+    if targets.contains(&Target::Filter) && source.pipewire_name().is_none() {
+        return usage(format!(
+            "--to filter: {source} is not a PipeWire camera; give it as pipewire:NAME, as listed by `bokehcam devices`"
+        ));
+    }
+    if targets.contains(&Target::Filter) && targets.contains(&Target::Window) {
+        return usage("--to filter: cannot be combined with a window, which keeps the camera open".to_string());
     }
     let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {

@@ -273,14 +273,13 @@ fn measure_blur(
         p95_ms: quantile_ms(&times, 0.95),
         max_ms: quantile_ms(&times, 1.0),
         frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
-        passes_ms: passes
-            .into_iter()
-            .map(|(name, mut times)| {
-                times.sort_unstable();
-                (name, quantile_ms(&times, 0.5))
-            })
-            .collect(),
+        passes_ms: passes.into_iter().map(|(name, times)| (name, median_ms(times))).collect(),
     })
+}
+
+fn median_ms(mut times: Vec<Duration>) -> f64 {
+    times.sort_unstable();
+    quantile_ms(&times, 0.5)
 }
 
 /// Returns the quantile `fraction` (0 to 1) of sorted times, in milliseconds.

@@ -55,12 +55,6 @@ pub struct RecordCommand {
 /// # Errors
 /// Fails if the source is unreadable, or the recording exists (without `--force`) or cannot be written.
 pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSettings) -> Result<(), CliError> {
-    let options = Options {
-        frames: command.frames.clone(),
-        depth: command.depth.clone(),
-        stereo: command.stereo.clone(),
-        ..Options::default()
-    };
     let ending = command.to.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     if ["mp4", "mkv", "webm", "mov", "avi", "y4m"].contains(&ending) && !command.to.is_dir() {
         let to = command.to.display();
@@ -72,65 +66,11 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
     for folder in command.source.input_paths() {
         refuse_overwriting_source("--to", &command.to, &folder)?;
     }
-    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &options, None)?;
-    unused::warn_of_unused(
-        &given.settings,
-        &unused::RunFacts {
-            source: unused::FrameOrigin::Source(command.source.kind()),
-            depth: depth_from,
-            uses_depth: true,
-            realtime: true,
-            ..unused::RunFacts::default()
-        },
-    );
-    if rig.is_some_and(|rig| !rig.metric) {
-        tracing::warn!(
-            "the distance between the two cameras is not known: the metres of this depth are based on an \
-                        assumed one"
-        );
-    }
-    let info = camera.info();
+    let mut source = open_source(command, given)?;
     let mut writer = RecordingWriter::create(&command.to, command.output.force)?;
-    let stop = terminal::stop_flag()?;
-    let progress = terminal::Progress::new(info.frames, global);
-    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-    // Matched depth does not depend on --depth-scale; other depth is doubted once.
-    let (mut lost, mut skip_check) = (0, rig.is_some());
-    let record_frames = || -> Result<bool, CliError> {
-        while !stop.load(Ordering::Relaxed) {
-            let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
-                Captured::Frame(stamp) => stamp,
-                Captured::Corrupt(error) => return Err(error.into()),
-                Captured::Lost(count, _) => {
-                    lost += count;
-                    continue;
-                }
-                Captured::Waiting => continue,
-                Captured::End => return Ok(true),
-            };
-            if let Some(source) = &mut source {
-                source.rectify(&mut color);
-                let right = (info.frame_data == FrameData::RightCamera).then_some(&right);
-                source.read(FrameInput { stamp, color: &color, right }, &mut depth)?;
-            }
-            let has_depth = source.is_some() || info.frame_data == FrameData::Depth;
-            let doubt = describe_implausible(&depth, writer.max_depth_m());
-            if let Some(doubt) = doubt.filter(|_| has_depth && !skip_check) {
-                skip_check = true;
-                tracing::warn!(
-                    "frame {}: {doubt}; is --depth-scale (units per metre) right for this source?",
-                    stamp.index
-                );
-            }
-            writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
-            progress.set_delivered(writer.frames() as u64);
-        }
-        // A camera is endless: stopping it is its regular end.
-        Ok(info.live || info.frames.is_none())
-    };
+    let mut lost = 0;
     // On errors and panics, the frames recorded so far are kept below.
-    let outcome = CliError::catch_panic(record_frames);
-    drop(progress);
+    let outcome = CliError::catch_panic(|| record_frames(&mut source, &mut writer, &mut lost, global));
     if lost > 0 {
         tracing::warn!("{lost} frames were lost because writing was too slow");
     }
@@ -146,7 +86,10 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
                     files => format!(", in place of {files} files of an earlier recording"),
                 };
                 let (dir, frames) = (written.dir.display(), written.frames);
-                terminal::print_to_stderr(&format!("{dir}: {frames} frames recorded from {}{gone}", info.name));
+                terminal::print_to_stderr(&format!(
+                    "{dir}: {frames} frames recorded from {}{gone}",
+                    source.camera.info().name
+                ));
             }
             Ok(())
         }
@@ -160,6 +103,76 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
             Err(fault)
         }
     }
+}
+
+/// Opens the source, and warns of settings without effect on it.
+fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source, CliError> {
+    let options = Options {
+        frames: command.frames.clone(),
+        depth: command.depth.clone(),
+        stereo: command.stereo.clone(),
+        ..Options::default()
+    };
+    let source = Source::open(&command.source, &options, None)?;
+    unused::warn_of_unused(
+        &given.settings,
+        &unused::RunFacts {
+            source: unused::FrameOrigin::Source(command.source.kind()),
+            depth: source.depth_from,
+            uses_depth: true,
+            realtime: true,
+            ..unused::RunFacts::default()
+        },
+    );
+    if source.rig.is_some_and(|rig| !rig.metric) {
+        tracing::warn!(
+            "the distance between the two cameras is not known: the metres of this depth are based on an \
+                        assumed one"
+        );
+    }
+    Ok(source)
+}
+
+/// Writes all frames of the source; returns whether it ended by itself or, for a camera, was stopped. Counts those `lost`.
+fn record_frames(
+    Source { camera, depth: source, rig, .. }: &mut Source,
+    writer: &mut RecordingWriter,
+    lost: &mut u64,
+    global: &options::Global,
+) -> Result<bool, CliError> {
+    let info = camera.info();
+    let stop = terminal::stop_flag()?;
+    let progress = terminal::Progress::new(info.frames, global);
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    // Matched depth does not depend on --depth-scale; other depth is doubted once.
+    let mut skip_check = rig.is_some();
+    while !stop.load(Ordering::Relaxed) {
+        let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
+            Captured::Frame(stamp) => stamp,
+            Captured::Corrupt(error) => return Err(error.into()),
+            Captured::Lost(count, _) => {
+                *lost += count;
+                continue;
+            }
+            Captured::Waiting => continue,
+            Captured::End => return Ok(true),
+        };
+        if let Some(source) = source {
+            source.rectify(&mut color);
+            let right = (info.frame_data == FrameData::RightCamera).then_some(&right);
+            source.read(FrameInput { stamp, color: &color, right }, &mut depth)?;
+        }
+        let has_depth = source.is_some() || info.frame_data == FrameData::Depth;
+        let doubt = describe_implausible(&depth, writer.max_depth_m());
+        if let Some(doubt) = doubt.filter(|_| has_depth && !skip_check) {
+            skip_check = true;
+            tracing::warn!("frame {}: {doubt}; is --depth-scale (units per metre) right for this source?", stamp.index);
+        }
+        writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
+        progress.set_delivered(writer.frames() as u64);
+    }
+    // A camera is endless: stopping it is its regular end.
+    Ok(info.live || info.frames.is_none())
 }
 
 /// Keeps the frames of an interrupted recording, and reports where.

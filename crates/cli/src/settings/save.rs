@@ -120,7 +120,7 @@ fn link_target(path: &Path) -> Result<PathBuf, CliError> {
 }
 
 /// Returns the key of a setting in a table, which may be its alias.
-pub fn find_key<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
+fn find_key<'a>(table: &dyn TableLike, name: &'a str) -> &'a str {
     let alias = settings::find_setting(name).and_then(settings::Setting::alias);
     alias.filter(|alias| table.contains_key(alias)).unwrap_or(name)
 }

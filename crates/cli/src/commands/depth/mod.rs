@@ -133,38 +133,12 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     matcher.compute_disparity(pair, &mut disparity).map_err(DepthError::from)?;
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
 
-    // A wrong rectification or order of the pictures shows in the images; the result alone looks plausible.
-    match check_pair(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
-        verdict @ Verdict::Misaligned { .. } => note(format!(
-            "{verdict}, and the disparity is wrong; {}",
-            match rectifier {
-                Some(_) => "the calibration does not match the position of the cameras: calibrate them again",
-                None => "rectify it with the --calib FILE of raw cameras",
-            }
-        )),
-        verdict @ Verdict::Swapped => note(verdict.to_string()),
-        Verdict::Identical => log::warn(&Verdict::Identical.to_string()),
-        Verdict::Rectified | Verdict::Unclear { .. } => {}
-    }
-
-    let force = command.output.force;
-    create_parent_folder(&command.out)?;
-    warn_of_leftovers([command.out.as_path()]);
-    match geometry.filter(|_| command.metres) {
-        Some(Geometry { rig, .. }) => {
-            let depth = disparity.to_depth_map(|px| rig.depth_m(px));
-            note_out_of_range_depth(&command.out, &depth, &note)?;
-            still::write_depth(&command.out, &depth, DEPTH_SCALE, force)?;
-        }
-        None => {
-            let rig = geometry.map(|geometry| geometry.rig);
-            still::write_disparity(&command.out, &disparity, rig, force)?;
-        }
-    }
-    if let Some(file) = &command.preview {
-        create_parent_folder(file)?;
-        still::write_color(file, &colorize_disparity(&disparity), force)?;
-    }
+    report_pair(
+        check_pair(&left, &right, disparities).map_err(DepthError::from)?.verdict(),
+        rectifier.is_some(),
+        &note,
+    );
+    command.write(&disparity, geometry.map(|geometry| geometry.rig), &note)?;
     if !global.quiet {
         let (width, height) = size;
         terminal::print_to_stderr(&format!(
@@ -176,7 +150,43 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     Ok(())
 }
 
+/// Says that the pair is misaligned, swapped or one picture: the result alone looks plausible.
+fn report_pair(verdict: Verdict, is_calibrated: bool, note: &dyn Fn(String)) {
+    match verdict {
+        Verdict::Misaligned { .. } => note(format!(
+            "{verdict}, and the disparity is wrong; {}",
+            match is_calibrated {
+                true => "the calibration does not match the position of the cameras: calibrate them again",
+                false => "rectify it with the --calib FILE of raw cameras",
+            }
+        )),
+        Verdict::Swapped => note(verdict.to_string()),
+        Verdict::Identical => log::warn(&verdict.to_string()),
+        Verdict::Rectified | Verdict::Unclear { .. } => {}
+    }
+}
+
 impl DepthCommand {
+    /// Writes disparity or depth, and the preview.
+    fn write(&self, disparity: &DisparityMap, rig: Option<StereoRig>, note: &dyn Fn(String)) -> Result<(), CliError> {
+        let force = self.output.force;
+        create_parent_folder(&self.out)?;
+        warn_of_leftovers([self.out.as_path()]);
+        match rig.filter(|_| self.metres) {
+            Some(rig) => {
+                let depth = disparity.to_depth_map(|px| rig.depth_m(px));
+                note_out_of_range_depth(&self.out, &depth, note)?;
+                still::write_depth(&self.out, &depth, DEPTH_SCALE, force)?;
+            }
+            None => still::write_disparity(&self.out, disparity, rig, force)?,
+        }
+        if let Some(file) = &self.preview {
+            create_parent_folder(file)?;
+            still::write_color(file, &colorize_disparity(disparity), force)?;
+        }
+        Ok(())
+    }
+
     /// Rejects conflicting options and files before reading any picture.
     fn check_options(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));

@@ -2,6 +2,7 @@
 
 mod store;
 
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -30,7 +31,7 @@ use bokehcam_window::session::SessionConfig;
 use bokehcam_window::state::{Output, State};
 use bokehcam_window::system::System;
 use bokehcam_window::texts;
-use bokehcam_window::window::{self, Preview, RemoteConfig, SavedState};
+use bokehcam_window::window::{self, Preview, PreviewOutcome, RemoteConfig, SavedState};
 
 use store::FileStore;
 
@@ -90,62 +91,26 @@ pub fn show_source(
     run_name: Option<&Name>,
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
-    report::check_path(stream.report.as_deref(), output.force, to)?;
-    let usage = |what: &str| CliError::Usage(what.to_string());
-    let refuse = |what: &str| Err(usage(what));
-    if stream.pace == Some(Pace::Asap) {
-        return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
-    }
-    if stream.on_demand {
-        return refuse("--on-demand: the window always watches; leave --on-demand out, or use `bokehcam stream`");
-    }
-    if parts.blur.look.0.behind.as_ref().is_some_and(BackgroundSetting::is_transparent) {
-        return refuse(
-            "--behind transparent: a window shows no transparency; `bokehcam stream SOURCE --to FILE.webm` (or FILE.mov, \
-             or DIR/ for PNG) writes it",
-        );
-    }
+    check_options(parts, to)?;
     if !name.is_empty() {
         let source = SourceName::from_str(name).map_err(|error| error.with_prefix(name))?;
         sinks::check_targets(to, parts, &source)?;
         unused::warn_by_source(&given.settings, source.kind());
     }
-    let outputs = to.iter().map(|target| match target {
-        Target::Null | Target::Stdout | Target::Window => {
-            Err(usage("--to: beside a window, use a virtual camera, a folder or a file"))
-        }
-        target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
-    });
-    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+    let outputs = list_outputs(to)?;
     report::check_writable(stream.report.as_deref())?;
-    let look = look::build_look(&parts.blur, &computing.quality)?;
-    // Assumes depth: the source's depth is known only once it is open, and the window may open others.
-    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
-    let focus = look.focus;
-    let look = Look { focus: focus.for_depth(false).unwrap_or(FocusRule::Auto), ..look };
-    let look = source::adapt_look(&look, &parts.blur.depth, known)?;
-    let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
-    let look = Look { effect, focus, ..look };
-    let saved_state_file = file::state_folder().map(|folder| folder.join("window.toml"));
+    let look = initial_look(parts)?;
     // `--fresh` neither reads nor overwrites the remembered state.
-    let saved_state_file = saved_state_file.filter(|_| !window.fresh);
+    let saved_state_file = file::state_folder().map(|folder| folder.join("window.toml")).filter(|_| !window.fresh);
     let saved_state = saved_state_file.as_deref().and_then(SavedState::read).unwrap_or_default();
-    let mut dropped = Vec::new();
-    let restored = Some(&saved_state).filter(|_| !given.has_look());
-    let restored = restored.and_then(|saved_state| saved_state.restore_look(|line| dropped.push(line)));
-    let restored = restored.filter(|restored| *restored != look);
     let source = if name.is_empty() { saved_state.restore_source().unwrap_or_default() } else { name.to_owned() };
-    let texts = texts::load_translation(window.language.as_deref())
-        .map_err(|line| CliError::Usage(format!("--language: {line}")))?;
-    texts.into_iter().for_each(texts::set_translation);
-    let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
-    let store = FileStore { chosen: global.config.clone(), given };
+    set_language(window)?;
     let mut state = initial_state(look, &source, window, stream.mirror, &saved_state);
-    if let Some(restored) = restored {
-        state.look = restored;
-        state.note(RESTORED_LOOK);
+    state.mirror_chosen = given.stated.iter().any(|name| name == "mirror");
+    if !given.has_look() {
+        restore_look(&mut state, &saved_state);
     }
-    dropped.into_iter().for_each(|line| state.note(line));
+    let store = FileStore { chosen: global.config.clone(), given };
     let rules = CommandLineRules {
         config: global.config.clone(),
         unused: unused::RunFacts {
@@ -157,51 +122,127 @@ pub fn show_source(
     };
     let control =
         controlled::claim_name(run_name, "preview")?.map(|claim| RemoteConfig { claim, rules: Arc::new(rules) });
-    let look = state.look.clone();
-    let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
-    let device = system.executors.open_device()?;
+    let mut system = System::new(parts.source_options(), state.look.clone(), Box::new(store));
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
-    state.mirror_chosen = mirror_chosen;
+    let device = system.executors.open_device()?;
+    let session = configure_session(parts, window, (state.look.clone(), source, outputs), system);
     let close_at_end = frames.frames.is_some() || !frames.repeat;
-    let stop = terminal::stop_flag()?;
     let outcome = window::run_preview(Preview {
         state,
-        session: SessionConfig {
-            services: Box::new(system),
-            look,
-            source,
-            outputs,
-            keep_going: stream.keep_going,
-            budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
-            threads: computing.to_compute_options().thread_count(),
-            output_request: Arc::default(),
-            demand: Demand::default(),
-            off: Arc::default(),
-            folders: window.save_to.clone().map_or_else(Folders::from_user_dirs, Folders::single),
-        },
+        session,
         theme: window.theme,
         device,
         close_at_end,
         saved_state,
         saved_state_file,
         control,
-        stop,
+        stop: terminal::stop_flag()?,
     })?;
-    // A report is written even if the preview failed.
-    let written = match (&stream.report, &outcome.report) {
-        (Some(path), Some(report)) => report::write_report(path, report, output.force),
+    conclude(outcome, close_at_end, stream.report.as_deref(), (output.force, global))
+}
+
+/// Refuses options that make no sense for a window.
+fn check_options(parts: &Streaming, to: &[Target]) -> Result<(), CliError> {
+    report::check_path(parts.stream.report.as_deref(), parts.output.force, to)?;
+    let refuse = |what: &str| Err(CliError::Usage(what.to_string()));
+    if parts.stream.pace == Some(Pace::Asap) {
+        return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
+    }
+    if parts.stream.on_demand {
+        return refuse("--on-demand: the window always watches; leave --on-demand out, or use `bokehcam stream`");
+    }
+    if parts.blur.look.0.behind.as_ref().is_some_and(BackgroundSetting::is_transparent) {
+        return refuse(
+            "--behind transparent: a window shows no transparency; `bokehcam stream SOURCE --to FILE.webm` (or FILE.mov, \
+             or DIR/ for PNG) writes it",
+        );
+    }
+    Ok(())
+}
+
+/// Returns the outputs beside the window.
+fn list_outputs(to: &[Target]) -> Result<Vec<Output>, CliError> {
+    let outputs = to.iter().map(|target| match target {
+        Target::Null | Target::Stdout | Target::Window => {
+            Err(CliError::Usage("--to: beside a window, use a virtual camera, a folder or a file".to_string()))
+        }
+        target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
+    });
+    outputs.collect()
+}
+
+/// Returns the look of the command line, as if there were depth: the source's is known only once it is open, and the
+/// window may open others.
+fn initial_look(parts: &Streaming) -> Result<Look, CliError> {
+    let look = look::build_look(&parts.blur, &parts.computing.quality)?;
+    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
+    let focus = look.focus;
+    let look = Look { focus: focus.for_depth(false).unwrap_or(FocusRule::Auto), ..look };
+    let look = source::adapt_look(&look, &parts.blur.depth, known)?;
+    let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
+    Ok(Look { effect, focus, ..look })
+}
+
+/// Writes and prints the report, also of a preview that failed.
+fn conclude(
+    outcome: PreviewOutcome,
+    closes_at_end: bool,
+    report: Option<&Path>,
+    (force, global): (bool, &Global),
+) -> Result<(), CliError> {
+    let written = match (report, &outcome.report) {
+        (Some(path), Some(report)) => report::write_report(path, report, force),
         _ => Ok(()),
     };
     outcome.report.iter().for_each(|report| terminal::print_report(report, global));
     match outcome.source_error {
-        Some(why) if outcome.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
+        Some(why) if outcome.report.is_none() || closes_at_end => Err(CliError::NoFrames(why)),
         _ => outcome.output_error.map_or(written, |why| Err(CliError::OutputFailed(why))),
     }
 }
 
 /// Shown at the start if the previous session's look is restored.
 const RESTORED_LOOK: &str = "This is the look of your last session. R goes back to the usual one.";
+
+fn set_language(window: &Window) -> Result<(), CliError> {
+    let texts = texts::load_translation(window.language.as_deref())
+        .map_err(|line| CliError::Usage(format!("--language: {line}")))?;
+    texts.into_iter().for_each(texts::set_translation);
+    Ok(())
+}
+
+fn configure_session(
+    Streaming { stream, computing, .. }: &Streaming,
+    window: &Window,
+    (look, source, outputs): (Look, String, Vec<Output>),
+    system: System,
+) -> SessionConfig {
+    SessionConfig {
+        services: Box::new(system),
+        look,
+        source,
+        outputs,
+        keep_going: stream.keep_going,
+        budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+        threads: computing.to_compute_options().thread_count(),
+        output_request: Arc::default(),
+        demand: Demand::default(),
+        off: Arc::default(),
+        folders: window.save_to.clone().map_or_else(Folders::from_user_dirs, Folders::single),
+    }
+}
+
+/// Applies the look of the last session, and notes what of it is unknown.
+fn restore_look(state: &mut State, saved_state: &SavedState) {
+    let mut dropped = Vec::new();
+    let restored = saved_state.restore_look(|line| dropped.push(line));
+    if let Some(restored) = restored.filter(|restored| *restored != state.look) {
+        state.look = restored;
+        state.note(RESTORED_LOOK);
+    }
+    dropped.into_iter().for_each(|line| state.note(line));
+}
 
 /// Returns the initial state of the window.
 fn initial_state(look: Look, source: &str, window: &Window, mirror: bool, saved_state: &SavedState) -> State {
