@@ -73,10 +73,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8], replace: bool) -> Result<(), 
 /// # Errors
 /// [`CliError::Io`] if it cannot be created.
 pub fn create_parent_folder(path: &Path) -> Result<(), CliError> {
-    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
-        None => Ok(()),
-    }
+    path.parent().map_or(Ok(()), |folder| fs::create_dir_all(folder).map_err(CliError::io(folder)))
 }
 
 /// Warns of hidden files that killed runs left in the folders of `paths`. Removing them is left to the user: where

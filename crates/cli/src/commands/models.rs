@@ -89,18 +89,13 @@ fn add_file(file: &Path) -> Result<(), CliError> {
         let what = "there is no such file: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
-    let bytes = input::read(file, network::MAX_BYTES).map_err(io_error(file))?;
+    let bytes = input::read(file, network::MAX_BYTES).map_err(CliError::io(file))?;
     let known = KnownNetwork::identify(&bytes).ok_or_else(|| {
         let what = "it is not a known network (`bokehcam models` lists them), or is incomplete; your own network needs \
                     no installation: use --depth matte:FILE or mono:FILE";
-        io_error(file)(io::Error::new(io::ErrorKind::InvalidData, what))
+        CliError::io(file)(io::Error::new(io::ErrorKind::InvalidData, what))
     })?;
     install(known, &bytes)
-}
-
-fn io_error(path: &Path) -> impl FnOnce(io::Error) -> CliError {
-    let path = path.to_owned();
-    move |source| CliError::Io { path, source }
 }
 
 /// Writes a network into this user's folder; an existing file is kept.
@@ -108,17 +103,17 @@ fn install(known: &KnownNetwork, bytes: &[u8]) -> Result<(), CliError> {
     let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
     let folder = network::model_folders().into_iter().next().ok_or_else(no_home)?;
     let target = folder.join(known.file);
-    std::fs::create_dir_all(&folder).map_err(io_error(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(CliError::io(&folder))?;
     match input::read(&target, network::MAX_BYTES) {
         Ok(there) if there == bytes => {}
         Ok(_) => {
             let what = "there is another file of this name: move it away";
-            return Err(io_error(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
+            return Err(CliError::io(&target)(io::Error::new(io::ErrorKind::AlreadyExists, what)));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            atomic_file::write(&target, bytes, false).map_err(io_error(&target))?;
+            atomic_file::write(&target, bytes, false).map_err(CliError::io(&target))?;
         }
-        Err(error) => return Err(io_error(&target)(error)),
+        Err(error) => return Err(CliError::io(&target)(error)),
     }
     print_to_stderr(&format!("{}: installed as {}, for --depth {}", known.file, target.display(), known.task.name()));
     Ok(())
@@ -141,7 +136,7 @@ fn fetch(name: Option<&str>) -> Result<(), CliError> {
     if !is_whole {
         let what =
             format!("the download is not {}, and was discarded: {} bytes of {}", known.file, bytes.len(), known.bytes);
-        return Err(io_error(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
+        return Err(CliError::io(Path::new(known.address))(io::Error::new(io::ErrorKind::InvalidData, what)));
     }
     install(known, &bytes)
 }
@@ -152,7 +147,7 @@ fn download(known: &KnownNetwork) -> Result<Vec<u8>, CliError> {
         ("curl", &["--fail", "--location", "--silent", "--show-error", "--proto", "=https", "--max-time", "300"]),
         ("wget", &["--https-only", "--no-verbose", "--timeout=60", "--output-document=-"]),
     ];
-    let address = || io_error(Path::new(known.address));
+    let address = || CliError::io(Path::new(known.address));
     for (client, options) in CLIENTS {
         print_to_stderr(&format!("{client} {} {}", options.join(" "), known.address));
         let mut command = Command::new(client);

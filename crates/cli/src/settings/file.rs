@@ -120,9 +120,7 @@ impl SettingsFile {
 
     /// Formats the message for an unknown preset, with a list of the known ones.
     pub fn unknown_preset(&self, name: &str) -> String {
-        let built_in = presets::built_in_presets().map(|preset| preset.name);
-        let all: Vec<String> = built_in.chain(self.presets.keys().cloned()).collect();
-        format!("there is no preset '{name}': use {}", all.join(", "))
+        format!("there is no preset '{name}': use {}", self.preset_names().join(", "))
     }
 }
 
