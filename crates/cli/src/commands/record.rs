@@ -135,7 +135,7 @@ fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source,
 
 /// Writes all frames of the source; returns whether it ended by itself or, for a camera, was stopped. Counts those `lost`.
 fn record_frames(
-    Source { camera, depth: source, rig, .. }: &mut Source,
+    Source { camera, depth: source, .. }: &mut Source,
     writer: &mut RecordingWriter,
     lost: &mut u64,
     global: &options::Global,
@@ -144,8 +144,6 @@ fn record_frames(
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-    // Matched depth does not depend on --depth-scale; other depth is doubted once.
-    let mut skip_check = rig.is_some();
     while !stop.load(Ordering::Relaxed) {
         let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
             Captured::Frame(stamp) => stamp,
@@ -163,11 +161,6 @@ fn record_frames(
             source.read(FrameInput { stamp, color: &color, right }, &mut depth)?;
         }
         let has_depth = source.is_some() || info.frame_data == FrameData::Depth;
-        let doubt = describe_implausible(&depth, writer.max_depth_m());
-        if let Some(doubt) = doubt.filter(|_| has_depth && !skip_check) {
-            skip_check = true;
-            tracing::warn!("frame {}: {doubt}; is --depth-scale (units per metre) right for this source?", stamp.index);
-        }
         writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
         progress.set_delivered(writer.frames() as u64);
     }
@@ -189,51 +182,13 @@ fn keep_partial(writer: RecordingWriter, to: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Minimum distance, in metres, that a depth camera can measure.
-const MIN_SCENE_M: f32 = 0.05;
-
-/// Describes why all the depth of a frame is implausible, if it is; a recording holds at most `max_depth_m`.
-fn describe_implausible(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
-    let known = depth.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
-    let (least_m, largest_m) = known.fold((f32::INFINITY, 0.0_f32), |(a, b), metres| (a.min(metres), b.max(metres)));
-    if largest_m == 0.0 {
-        None
-    } else if least_m > max_depth_m {
-        Some(format!("all depth is {least_m:.1} m away or more, but a recording holds only up to {max_depth_m:.1} m"))
-    } else if largest_m < MIN_SCENE_M {
-        Some(format!("all depth is nearer than {:.1} mm", largest_m * 1e3))
-    } else {
-        None
-    }
-}
-
 /// Warns about depth beyond the recording's range.
 fn warn_out_of_range_depth(written: &RecordingSummary, max_depth_m: f32) {
     if written.out_of_range_depths > 0 {
         let percent = 100.0 * written.out_of_range_depths as f64 / written.known_depths as f64;
         tracing::warn!(
             "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is stored as \
-             unknown"
+             unknown; is --depth-scale (units per metre) right for this source?"
         );
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn depth_that_no_camera_sees_is_doubted() {
-        let said = |metres: &[f32]| {
-            describe_implausible(
-                &DepthMap { width: metres.len() as u32, height: 1, metres: metres.into(), ..DepthMap::default() },
-                13.1,
-            )
-        };
-        assert_eq!(said(&[0.0, 1.0, 40.0]), None);
-        assert_eq!(said(&[0.0, f32::NAN]), None);
-        assert_eq!(said(&[0.02, 0.06]), None);
-        assert!(said(&[0.0, 20.0, 1000.0]).unwrap().contains("20.0 m away or more"));
-        assert!(said(&[0.0, 0.001, 0.0034]).unwrap().contains("nearer than 3.4 mm"));
     }
 }
