@@ -180,19 +180,16 @@ pub fn rename(from: &Path, to: &Path, replace: bool) -> io::Result<()> {
     }
 }
 
-/// Renames an incomplete file `part` to `NAME.incomplete.EXT` (so that players still open it), without extension to
-/// `NAME.incomplete`, or to `NAME.incomplete.2.EXT` and so on if the name exists.
+/// Renames an incomplete file `part` to `NAME.incomplete.EXT` (so that players still open it), or to
+/// `NAME.incomplete.2.EXT` and so on if the name exists.
 ///
 /// # Errors
 /// Returns the error of the system.
 pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
-    // Dots in a folder's name are no extension.
-    let ending = path.extension().filter(|_| !part.is_dir());
-    let stem = if ending.is_some() { path.file_stem() } else { path.file_name() };
     for number in 1.. {
-        let mut kept = stem.unwrap_or_default().to_owned();
+        let mut kept = path.file_stem().unwrap_or_default().to_owned();
         kept.push(if number == 1 { ".incomplete".into() } else { format!(".incomplete.{number}") });
-        if let Some(ending) = ending {
+        if let Some(ending) = path.extension() {
             kept.push(".");
             kept.push(ending);
         }

@@ -1,29 +1,24 @@
-//! Folders whose files belong together, such as the pictures of one run: old files stay until all new ones are
-//! complete.
+//! Folders whose files belong together, such as the pictures of one run.
 //!
-//! The list [`LIST_NAME`] in the folder names the files that this program wrote, one per line; other files are never
-//! touched. In an empty folder files are written directly, each atomically. Otherwise they are written to a hidden
-//! subfolder, [`STAGING_NAME`], and renamed once all are complete. The folder is locked while it is open.
+//! In an empty folder files are written directly, each atomically. With permission to replace, those of a folder that is
+//! not empty go to a new one beside it, `NAME.incomplete`, which takes its place once it is complete; so the old folder
+//! is never lost, and a killed run leaves both. The list [`LIST_NAME`] in a folder names the files that this program
+//! wrote: a folder with any other file is never replaced.
 
-mod list;
-mod replace;
-
+use std::collections::HashSet;
 use std::fs::{self, File};
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use rustix::fs::{FlockOperation, flock, syncfs};
+use rustix::fs::syncfs;
 
-use self::list::List;
-pub use self::list::adopt_files;
-use self::replace::{create_subfolder, keep_incomplete, recover_interrupted, refuse_foreign, replace_files};
-use super::atomic_file::PartFile;
+use super::atomic_file::{PartFile, is_part_name, sync_folder};
+use super::{input, lock};
 
 /// The name of the list of our own files.
 pub const LIST_NAME: &str = ".bokehcam";
-/// The hidden subfolder for files that will replace others.
-pub const STAGING_NAME: &str = ".bokehcam.part";
 
 /// An error in writing a folder.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +26,7 @@ pub enum FolderError {
     /// The folder is not empty, and nothing may be replaced.
     #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
     NotEmpty { path: PathBuf },
-    /// A file that would be overwritten is not ours.
+    /// A file that would be replaced is not ours.
     #[error("{} was not written by bokehcam, so it is not replaced: move it away, or choose another \
              folder", path.display())]
     Foreign { path: PathBuf },
@@ -60,81 +55,48 @@ pub fn has_file_list(path: &Path) -> bool {
     path.join(LIST_NAME).symlink_metadata().is_ok_and(|list| list.is_file())
 }
 
-/// The files that will be written.
-pub struct FileSet<'a> {
-    /// Subfolders with files of the set.
-    pub subfolders: &'a [&'a str],
-    /// Whether a file name may belong to the set, such as `000000.png` or `rgb/000000.png`.
-    pub contains: &'a dyn Fn(&str) -> bool,
-}
-
 /// A folder that is being written. Dropping it has the effect of [`Folder::finish_incomplete`].
 #[derive(Debug)]
 pub struct Folder {
     /// The path without a trailing slash.
     path: PathBuf,
-    /// The hidden subfolder that files are written to, if not to the folder itself.
-    staging: Option<PathBuf>,
-    list: List,
-    /// Holds the lock while it is open.
+    /// The folder that files are written to: `path`, or the one that replaces it.
+    target: PathBuf,
+    /// Number of files written so far.
+    file_count: u64,
+    /// Holds the lock of `target` while it is open.
     lock: File,
     is_finished: bool,
 }
 
 impl Folder {
-    /// Opens the folder for a set of files, and creates it if needed. Files of killed runs are kept as
-    /// `NAME.incomplete`, which is logged.
+    /// Opens the folder, and creates it if needed.
     ///
     /// # Errors
-    /// The folder is not empty and `replace` is not set, or has a file of the set that is not ours; another run writes
-    /// it, or it cannot be written.
-    pub fn open(path: &Path, replace: bool, set: &FileSet) -> Result<Self, FolderError> {
-        let path: PathBuf = path.components().collect();
-        let write = || FolderError::cannot_write(&path);
-        fs::create_dir_all(&path).map_err(|error| {
-            // The system reports `exists` or `not a directory`, but not for which part of the path.
-            let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
-            let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is not a folder");
-            match in_the_way {
-                Some(part) => FolderError::cannot_write(part)(no_folder()),
-                None => FolderError::cannot_write(&path)(error),
-            }
-        })?;
-        let lock = File::open(&path).map_err(write())?;
-        if flock(&lock, FlockOperation::NonBlockingLockExclusive) == Err(rustix::io::Errno::WOULDBLOCK) {
-            return Err(FolderError::Busy { path });
+    /// The folder is not empty and `replace` is not set, or has a file that is not ours; another run writes it, or it
+    /// cannot be written.
+    pub fn open(path: &Path, replace: bool) -> Result<Self, FolderError> {
+        let mut path: PathBuf = path.components().collect();
+        create_folder(&path)?;
+        if path.file_name().is_none() || path.is_symlink() {
+            path = path.canonicalize().map_err(FolderError::cannot_write(&path))?;
         }
-        recover_interrupted(&path, set)?;
-        let mut names = fs::read_dir(&path).map_err(write())?.map(|entry| entry.map(|entry| entry.file_name()));
-        let other =
-            names.find(|name| name.as_ref().map_or(true, |name| name != LIST_NAME)).transpose().map_err(write())?;
-        let staging = match other {
-            None => None,
-            Some(_) if !replace => return Err(FolderError::NotEmpty { path }),
-            Some(_) => {
-                refuse_foreign(&path, set)?;
-                let part = path.join(STAGING_NAME);
-                fs::create_dir(&part).map_err(FolderError::cannot_write(&part))?;
-                Some(part)
+        let mut lock = lock_folder(&path)?;
+        let mut target = path.clone();
+        let mut entries = fs::read_dir(&path).map_err(FolderError::cannot_write(&path))?;
+        if !entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == LIST_NAME)) {
+            if !replace {
+                return Err(FolderError::NotEmpty { path });
             }
-        };
-        let list = List::create(staging.as_ref().unwrap_or(&path))?;
-        Ok(Self { path, staging, list, lock, is_finished: false })
-    }
-
-    /// Returns the path of the folder.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Returns the number of files written so far.
-    pub fn file_count(&self) -> u64 {
-        self.list.len()
-    }
-
-    /// Returns whether old files are replaced once the new ones are complete.
-    pub fn is_replacing(&self) -> bool {
-        self.staging.is_some()
+            count_own_files(&path)?;
+            target = create_beside(&path, "incomplete")?;
+            lock = lock_folder(&target)?;
+        }
+        let list = target.join(LIST_NAME);
+        // An old list is that of files that are gone.
+        let _ = fs::remove_file(&list);
+        File::create_new(&list).map_err(FolderError::cannot_write(&list))?;
+        Ok(Self { path, target, file_count: 0, lock, is_finished: false })
     }
 
     /// Starts a file with this name, and creates its subfolder if needed. [`Folder::commit_file`] completes it.
@@ -143,9 +105,9 @@ impl Folder {
     /// The folder is gone, or cannot be written.
     pub fn create_file(&self, name: &str) -> Result<PartFile, FolderError> {
         self.check_exists()?;
-        let path = self.target().join(name);
+        let path = self.target.join(name);
         if let Some((subfolder, _)) = name.rsplit_once('/') {
-            create_subfolder(&self.target().join(subfolder))?;
+            create_folder(&self.target.join(subfolder))?;
         }
         PartFile::create(&path).map_err(FolderError::cannot_write(&path))
     }
@@ -156,42 +118,40 @@ impl Folder {
     /// A file with its name has appeared, or it cannot be written; the folder is unchanged.
     pub fn commit_file(&mut self, part: PartFile) -> Result<(), FolderError> {
         let path = part.path().to_owned();
-        let name = path.strip_prefix(self.target()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
+        let name = path.strip_prefix(&self.target).ok().and_then(Path::to_str).unwrap_or_default();
         part.commit_unsynced().map_err(|cause| match cause.kind() {
             ErrorKind::AlreadyExists => FolderError::Foreign { path: path.clone() },
             _ => FolderError::Write { path: path.clone(), cause },
         })?;
-        self.list.add(&name).inspect_err(|_| {
+        list_file(&self.target, name).inspect_err(|_| {
             // An unlisted file would never be replaced. Report the list's error.
             let _ = fs::remove_file(&path);
-        })
+        })?;
+        self.file_count += 1;
+        Ok(())
     }
 
-    /// Ends a complete set of files: it replaces the files on an earlier run's list. Returns their number.
+    /// Ends a complete set of files, which replaces that of an earlier run. Returns the number of old files.
     ///
     /// # Errors
-    /// A foreign file has appeared, which stays. The new files, and those that could not be moved, are kept as
-    /// `NAME.incomplete`.
+    /// A foreign file has appeared in the old folder, or it cannot be moved: the old folder stays, and the new files are
+    /// in `NAME.incomplete`.
     pub fn finish(mut self) -> Result<u64, FolderError> {
         self.check_exists()?;
         self.sync()?;
         self.is_finished = true;
-        let Some(part) = self.staging.take() else {
-            self.remove_empty_list();
-            return Ok(0);
-        };
-        let replaced = replace_files(&part, &self.path);
-        if replaced.is_err() {
-            keep_incomplete(&part, &self.path)?;
+        if self.target != self.path {
+            return self.replace_old();
         }
-        replaced
+        self.remove_if_empty();
+        Ok(0)
     }
 
-    /// Ends an incomplete set of files: old files stay, and the new ones are kept as `NAME.incomplete`; returns that
+    /// Ends an incomplete set of files: the old folder stays, and the new files are in `NAME.incomplete`; returns that
     /// path. If the folder was empty, the new files stay in it.
     ///
     /// # Errors
-    /// They cannot be renamed, and stay in a hidden subfolder.
+    /// The folder is gone.
     pub fn finish_incomplete(mut self) -> Result<Option<PathBuf>, FolderError> {
         self.end_incomplete()
     }
@@ -202,39 +162,54 @@ impl Folder {
         self.check_exists()?;
         // Files that cannot be synced are kept as well.
         let _ = self.sync();
-        match self.staging.take() {
-            Some(part) if self.list.len() > 0 => keep_incomplete(&part, &self.path).map(Some),
-            Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::cannot_write(&part)),
-            None => {
-                self.remove_empty_list();
-                Ok(None)
-            }
+        self.remove_if_empty();
+        Ok((self.target != self.path && self.file_count > 0).then(|| self.target.clone()))
+    }
+
+    /// Moves the old folder away, the new one to its place, and then removes the old one.
+    fn replace_old(&self) -> Result<u64, FolderError> {
+        let write = || FolderError::cannot_write(&self.path);
+        let count = count_own_files(&self.path)?;
+        let permissions = fs::metadata(&self.path).map_err(write())?.permissions();
+        fs::set_permissions(&self.target, permissions).map_err(write())?;
+        let old = create_beside(&self.path, "replaced")?;
+        let moved = fs::rename(&self.path, &old).and_then(|()| {
+            fs::rename(&self.target, &self.path).inspect_err(|_| {
+                // Report the first error.
+                let _ = fs::rename(&old, &self.path);
+            })
+        });
+        if let Err(cause) = moved {
+            // Succeeds only if the old folder is in its place.
+            let _ = fs::remove_dir(&old);
+            return Err(write()(cause));
         }
+        sync_folder(&self.path).map_err(write())?;
+        fs::remove_dir_all(&old).map_err(FolderError::cannot_write(&old))?;
+        Ok(count)
     }
 
     /// Syncs all files at once: a sync after each would take longer than a camera can wait.
     fn sync(&self) -> Result<(), FolderError> {
-        syncfs(&self.lock).map_err(|error| FolderError::cannot_write(&self.path)(error.into()))
+        syncfs(&self.lock).map_err(|error| FolderError::cannot_write(&self.target)(error.into()))
     }
 
     fn check_exists(&self) -> Result<(), FolderError> {
         let identity = |folder: fs::Metadata| (folder.dev(), folder.ino());
-        let opened = self.lock.metadata().map(identity).map_err(FolderError::cannot_write(&self.path))?;
+        let opened = self.lock.metadata().map(identity).map_err(FolderError::cannot_write(&self.target))?;
         // A new folder with the same name is not ours.
-        match fs::metadata(&self.path).map(identity) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::cannot_write(&self.path)(error)),
+        match fs::metadata(&self.target).map(identity) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(FolderError::cannot_write(&self.target)(error)),
             Ok(there) if there == opened => Ok(()),
-            _ => Err(FolderError::Gone { path: self.path.clone() }),
+            _ => Err(FolderError::Gone { path: self.target.clone() }),
         }
     }
 
-    /// Returns the folder that files are written to now.
-    fn target(&self) -> &Path {
-        self.staging.as_ref().unwrap_or(&self.path)
-    }
-
-    fn remove_empty_list(&self) {
-        if self.list.len() == 0 {
+    /// Removes what a set without files has: its list, subfolders and, beside an old one, its folder.
+    fn remove_if_empty(&self) {
+        if self.file_count == 0 && self.target != self.path {
+            let _ = fs::remove_dir_all(&self.target);
+        } else if self.file_count == 0 {
             let _ = fs::remove_file(self.path.join(LIST_NAME));
         }
     }
@@ -246,6 +221,75 @@ impl Drop for Folder {
             && let Err(error) = self.end_incomplete()
         {
             tracing::warn!("{error}");
+        }
+    }
+}
+
+/// Adds a file of ours to the list of `folder`.
+///
+/// # Errors
+/// The list cannot be written.
+pub fn list_file(folder: &Path, name: &str) -> Result<(), FolderError> {
+    let path = folder.join(LIST_NAME);
+    let list = File::options().append(true).create(true).open(&path);
+    // The line break comes first, so that a name that was truncated by a full disk spoils no other.
+    list.and_then(|mut list| list.write_all(format!("\n{name}").as_bytes())).map_err(FolderError::cannot_write(&path))
+}
+
+/// Returns the number of files in a folder and its subfolders. Fails at a file that is not on its list.
+fn count_own_files(path: &Path) -> Result<u64, FolderError> {
+    let list = path.join(LIST_NAME);
+    let names = match input::read_text(&list, input::MAX_TEXT_BYTES) {
+        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+        names => names.map_err(FolderError::cannot_write(&list))?,
+    };
+    let names: HashSet<&str> = names.lines().collect();
+    let (mut count, mut folders) = (0, vec![path.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).map_err(FolderError::cannot_write(&folder))? {
+            let (file, is_folder) = entry
+                .and_then(|entry| Ok((entry.path(), entry.file_type()?.is_dir())))
+                .map_err(FolderError::cannot_write(&folder))?;
+            let name = file.strip_prefix(path).ok().and_then(Path::to_str);
+            match is_folder {
+                true => folders.push(file),
+                false if name.is_some_and(|name| names.contains(name)) => count += 1,
+                false if file == list || file.file_name().is_some_and(is_part_name) => {}
+                false => return Err(FolderError::Foreign { path: file }),
+            }
+        }
+    }
+    Ok(count)
+}
+
+fn lock_folder(path: &Path) -> Result<File, FolderError> {
+    lock::lock_folder(path, Duration::ZERO).map_err(|cause| match cause.kind() {
+        ErrorKind::WouldBlock => FolderError::Busy { path: path.to_owned() },
+        _ => FolderError::Write { path: path.to_owned(), cause },
+    })
+}
+
+fn create_folder(path: &Path) -> Result<(), FolderError> {
+    fs::create_dir_all(path).map_err(|error| {
+        // The system reports `exists` or `not a directory`, but not for which part of the path.
+        let in_the_way = path.ancestors().find(|part| part.exists() && !part.is_dir());
+        let no_folder = || io::Error::new(ErrorKind::NotADirectory, "it is not a folder");
+        match in_the_way {
+            Some(part) => FolderError::cannot_write(part)(no_folder()),
+            None => FolderError::cannot_write(path)(error),
+        }
+    })
+}
+
+/// Creates a folder `NAME.WHAT` beside `path`, or `NAME.WHAT.2` and so on if the name exists.
+fn create_beside(path: &Path, what: &str) -> Result<PathBuf, FolderError> {
+    let mut number = 1;
+    loop {
+        let mut name = path.as_os_str().to_owned();
+        name.push(if number == 1 { format!(".{what}") } else { format!(".{what}.{number}") });
+        match fs::create_dir(&name) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+            made => return made.map_err(FolderError::cannot_write(name.as_ref())).map(|()| name.into()),
         }
     }
 }

@@ -244,8 +244,6 @@ pub struct Options {
     pub size: (u32, u32),
     /// Time between frames, > 0.
     pub period_ns: u64,
-    /// Maximum number of frames, if known.
-    pub frames: Option<u64>,
     /// Whether existing outputs may be overwritten.
     pub force: bool,
     /// Width and height of a virtual camera; `None`: those of the frames, with the width rounded down to even.
@@ -271,7 +269,6 @@ impl Options {
         Self {
             size,
             period_ns,
-            frames: None,
             force: false,
             out_size: None,
             threads: None,

@@ -10,7 +10,7 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::{Ending, Options, Sink, SinkError, interleave_alpha};
 use crate::files::atomic_file::PartFile;
-use crate::files::folder::{FileSet, Folder};
+use crate::files::folder::Folder;
 use crate::frame::ColorImage;
 
 /// Writes `DIR/000000.png` and on, numbered in output order. Each file appears complete; files of an earlier run stay
@@ -28,19 +28,16 @@ impl PngFolder {
     /// Opens the folder, creating it if it is missing.
     ///
     /// # Errors
-    /// The folder is not empty and `force` is not set, contains another program's file with the name of an expected
-    /// frame, or cannot be created.
+    /// The folder is not empty and `force` is not set, contains another program's file, or cannot be created.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
-        let contains =
-            |name: &str| parse_number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
-        let folder = Folder::open(path, options.force, &FileSet { subfolders: &[], contains: &contains })?;
+        let folder = Folder::open(path, options.force)?;
         Ok(Self { path: path.to_owned(), folder: Some(folder), next_number: 0, rgba: Vec::new() })
     }
 
     /// Writes interleaved `bytes` of a picture of `size`.
     fn write_png(&mut self, bytes: &[u8], size: (u32, u32), form: ExtendedColorType) -> Result<(), SinkError> {
         let Some(folder) = &mut self.folder else { return Ok(()) };
-        let part = folder.create_file(&file_name(self.next_number))?;
+        let part = folder.create_file(&format!("{:06}.png", self.next_number))?;
         encode_png(bytes, size, form, &part)?;
         folder.commit_file(part)?;
         self.next_number += 1;
@@ -50,7 +47,7 @@ impl PngFolder {
     /// Continues after a picture was written, or keeps what was written before it failed.
     fn check_written(&mut self, written: Result<(), SinkError>) -> Result<ControlFlow<()>, SinkError> {
         let Err(error) = written else { return Ok(ControlFlow::Continue(())) };
-        // Files that cannot be renamed stay in the hidden folder; the first error is the one to report.
+        // The first error is the one to report.
         let kept = self.folder.take().and_then(|folder| folder.finish_incomplete().ok().flatten());
         Err(match kept {
             Some(kept) => SinkError::Kept { error: Box::new(error), kept },
@@ -68,16 +65,6 @@ fn encode_png(bytes: &[u8], size: (u32, u32), form: ExtendedColorType, part: &Pa
             other => SinkError::Png { path: part.path().to_owned(), message: other.to_string() },
         })?;
     buffered.flush().map_err(SinkError::write(part.path()))
-}
-
-/// Parses the number in a file name, if this sink would use that name.
-fn parse_number(name: &str) -> Option<u64> {
-    let number = name.strip_suffix(".png")?.parse().ok()?;
-    (name == file_name(number)).then_some(number)
-}
-
-fn file_name(number: u64) -> String {
-    format!("{number:06}.png")
 }
 
 impl Sink for PngFolder {

@@ -5,7 +5,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::files::atomic_file::{self, PartFile};
-use crate::files::folder::{self, Folder};
+use crate::files::folder::{Folder, list_file};
 use crate::files::input;
 use crate::recording::error::RecordingError;
 use crate::recording::list::{split_lines, whole_lines};
@@ -59,21 +59,17 @@ impl GrowingList {
     /// Completes lists that a killed process left unfinished: lists of `names` in `dir` that have entries, and whose
     /// final name is free, are truncated to complete lines and renamed.
     pub(super) fn recover_interrupted(dir: &Path, names: &[&str]) -> Result<(), RecordingError> {
-        // A recording that would have replaced another one is in `STAGING_NAME`.
-        for folder in [dir.to_owned(), dir.join(folder::STAGING_NAME)] {
-            for name in names {
-                let list = folder.join(name);
-                // If the folder is missing, there is nothing to rescue.
-                for part in atomic_file::find_abandoned(&list).unwrap_or_default() {
-                    let is_taken = list.symlink_metadata().is_ok();
-                    if is_taken || !truncate_partial_line(&part).map_err(RecordingError::io("complete", &part))? {
-                        continue;
-                    }
-                    atomic_file::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
-                    // Marks the list as ours for later runs.
-                    folder::adopt_files(&folder, [(*name).to_owned()])?;
-                    tracing::warn!("{}: restored from an interrupted recording", list.display());
+        for name in names {
+            let list = dir.join(name);
+            // If the folder is missing, there is nothing to rescue.
+            for part in atomic_file::find_abandoned(&list).unwrap_or_default() {
+                let is_taken = list.symlink_metadata().is_ok();
+                if is_taken || !truncate_partial_line(&part).map_err(RecordingError::io("complete", &part))? {
+                    continue;
                 }
+                atomic_file::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
+                list_file(dir, name)?;
+                tracing::warn!("{}: restored from an interrupted recording", list.display());
             }
         }
         Ok(())

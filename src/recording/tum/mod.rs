@@ -9,7 +9,6 @@
 mod associations;
 mod growing;
 mod list;
-mod listed;
 mod open;
 mod time;
 mod writer;

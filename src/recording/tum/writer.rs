@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::growing::GrowingList;
 use super::time::Seconds;
-use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, listed};
-use crate::files::folder::{self, FileSet, Folder, FolderError};
+use super::{COLOR_LIST, DEPTH_LIST};
+use crate::files::folder::{Folder, FolderError};
 use crate::frame::{ColorImage, DepthMap};
 use crate::recording::error::RecordingError;
 use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
@@ -15,15 +15,12 @@ use crate::recording::{check_depth_scale, encode};
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
 
-/// The files of a recording within its folder.
-const FILE_SET: FileSet = FileSet { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], contains: &is_recording_file };
-
 /// Options for writing a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WriterOptions {
     /// Units of the depth pictures per metre, > 0. A depth beyond 65535 units is written as unknown.
     pub depth_scale: f32,
-    /// Whether an existing recording in the folder may be replaced, once the new one is complete.
+    /// Whether the folder of an existing recording by this program may be replaced, once the new one is complete.
     pub overwrite: bool,
 }
 
@@ -37,8 +34,8 @@ impl Default for WriterOptions {
 /// Writes a recording frame by frame, with memory for one frame.
 ///
 /// The pictures are `rgb/000000.png` (8-bit RGB), `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The lists
-/// are finished last; until then the folder is not a recording. Files of an earlier recording stay until the new one is
-/// complete, and no other file in the folder is touched. [`Writer::finish`] or [`Writer::finish_incomplete`] must
+/// are finished last; until then the folder is not a recording. An earlier recording stays until the new one is complete.
+/// [`Writer::finish`] or [`Writer::finish_incomplete`] must
 /// end it; otherwise there are no lists.
 pub struct Writer {
     dir: PathBuf,
@@ -59,15 +56,12 @@ impl Writer {
     /// in that folder gets its lists first.
     ///
     /// # Errors
-    /// The folder has content that may not be overwritten, or pictures with names of a recording that no list names;
-    /// another process writes it, or it cannot be written; the depth scale is not a number > 0.
+    /// The folder has content that may not be replaced; another process writes it, or it cannot be written; the depth
+    /// scale is not a number > 0.
     pub fn create(dir: &Path, options: &WriterOptions) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         GrowingList::recover_interrupted(dir, &[DEPTH_LIST, COLOR_LIST])?;
-        if options.overwrite {
-            folder::adopt_files(dir, listed::find_pictures(dir).chain(listed::find_lists(dir)))?;
-        }
-        let folder = Folder::open(dir, options.overwrite, &FILE_SET).map_err(|error| match error {
+        let folder = Folder::open(dir, options.overwrite).map_err(|error| match error {
             FolderError::NotEmpty { path } => RecordingError::Exists { path },
             other => other.into(),
         })?;
@@ -181,12 +175,4 @@ impl Writer {
 
 fn format_depth_header(depth_scale: f32) -> String {
     format!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown\n# timestamp filename\n")
-}
-
-/// Returns whether a recording uses this name for a list or picture, such as `rgb/000000.png`.
-fn is_recording_file(name: &str) -> bool {
-    let folders = [COLOR_FOLDER, DEPTH_FOLDER];
-    let number = folders.iter().find_map(|folder| name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".png"));
-    let is_number = |number: &str| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit());
-    [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS].contains(&name) || number.is_some_and(is_number)
 }

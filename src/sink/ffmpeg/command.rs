@@ -3,14 +3,21 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use super::container::Container;
 use crate::color::YcbcrMatrix;
 use crate::sink::Sound;
 use crate::video::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Container {
+    /// `.mp4` and `.mov`.
+    Mp4,
+    /// `.mkv` and `.webm`.
+    Matroska,
+}
+
 /// Output parameters of ffmpeg, selected by the file's extension.
 pub(super) struct Format {
-    pub container: Container,
+    container: Container,
     muxer: &'static [&'static str],
     encoder: &'static [&'static str],
     /// The pixel format of opaque pictures, and of those with an alpha channel, if it keeps that.

@@ -111,18 +111,19 @@ fn an_existing_recording_is_kept_unless_asked() {
     }
     assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["exists already"]);
 
-    fs::write(dir.path().join("associations.txt"), "0 rgb/000000.png 0 depth/000000.png\n").unwrap();
     fs::write(dir.path().join("notes.txt"), "kept").unwrap();
+    assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["notes.txt was not written by"]);
+    fs::remove_file(dir.path().join("notes.txt")).unwrap();
     let mut writer = Writer::create(dir.path(), &overwrite).unwrap();
     let other = frame(9).0;
     writer.add(7, &other, None).unwrap();
     assert!(dir.path().join("rgb/000001.png").exists(), "what was there stays until the new is whole");
     let written = writer.finish().unwrap();
-    assert_eq!((written.replaced, written.frames), (5, 1));
+    assert_eq!((written.replaced, written.frames), (4, 1));
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
     assert_eq!((recording.len(), recording.has_depth()), (1, false));
     assert_eq!(color_of(&recording, 0).unwrap(), other);
-    assert!(!dir.path().join("rgb/000001.png").exists() && dir.path().join("notes.txt").exists());
+    assert!(!dir.path().join("rgb/000001.png").exists());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs;
 
 use bokehcam::files::folder::FolderError;
 use bokehcam::frame::ColorImage;
-use bokehcam::sink::{Ending, Options, SinkError};
+use bokehcam::sink::{Ending, SinkError};
 
 use super::{PERIOD_NS, forced, listing, open, options, picture, put_all};
 
@@ -23,35 +23,34 @@ fn pictures_are_numbered_and_exact() {
 }
 
 #[test]
-fn a_folder_is_replaced_only_by_force_and_only_what_was_written_by_us() {
+fn a_folder_is_replaced_only_by_force_and_only_if_it_was_written_by_us() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let mut sink = open(&out.join(""), &options((6, 4))).unwrap();
     put_all(&mut *sink, &[0, 1, 2].map(|frame| picture(6, 4, frame)));
     sink.finish(Ending::Complete).unwrap();
-    for name in ["7.png", "20240101.png", "notes.txt"] {
-        fs::write(out.join(name), "mine").unwrap();
-    }
     let not_empty = open(&out.join(""), &options((6, 4))).err().unwrap();
     assert!(matches!(not_empty, SinkError::Folder(FolderError::NotEmpty { .. })), "{not_empty}");
-    // A name that a frame may have, in a run of unlimited length.
-    let foreign = open(&out.join(""), &forced((6, 4))).err().unwrap();
-    assert!(matches!(foreign, SinkError::Folder(FolderError::Foreign { .. })), "{foreign}");
-    let two = Options { frames: Some(2), ..forced((6, 4)) };
+    for name in ["7.png", "notes.txt"] {
+        fs::write(out.join(name), "mine").unwrap();
+        let foreign = open(&out.join(""), &forced((6, 4))).err().unwrap();
+        assert!(matches!(foreign, SinkError::Folder(FolderError::Foreign { .. })), "{foreign}");
+        assert_eq!(fs::read(out.join(name)).unwrap(), b"mine");
+        fs::remove_file(out.join(name)).unwrap();
+    }
 
     let old = fs::read(out.join("000000.png")).unwrap();
-    let mut sink = open(&out.join(""), &two).unwrap();
+    let mut sink = open(&out.join(""), &forced((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5)]);
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old, "the old ones stay until the new are whole");
     sink.finish(Ending::Truncated).unwrap();
     assert_eq!(fs::read(out.join("000000.png")).unwrap(), old);
     assert_eq!(listing(&folder.path().join("out.incomplete")), [".bokehcam", "000000.png"]);
 
-    let mut sink = open(&out.join(""), &two).unwrap();
+    let mut sink = open(&out.join(""), &forced((6, 4))).unwrap();
     put_all(&mut *sink, &[picture(6, 4, 5), picture(6, 4, 6)]);
     sink.finish(Ending::Complete).unwrap();
-    let expected = [".bokehcam", "000000.png", "000001.png", "20240101.png", "7.png", "notes.txt"];
-    assert_eq!(listing(&out), expected, "no tail of the old ones");
+    assert_eq!(listing(&out), [".bokehcam", "000000.png", "000001.png"], "no tail of the old ones");
     assert_ne!(fs::read(out.join("000000.png")).unwrap(), old);
 }
 

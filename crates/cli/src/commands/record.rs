@@ -22,8 +22,8 @@ use bokehcam::source::{Options, Source, SourceName};
 ///
 /// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; for two cameras, by stereo matching) and their
 /// lists. The lists appear when the recording is complete; Ctrl-C completes a recording of a camera. With --force, a
-/// complete recording replaces the files listed by an earlier one in the folder, and no others; an incomplete one is
-/// kept beside it as DIR.incomplete. A name ending in .mcap is a file instead: colour as CompressedImage (PNG), depth
+/// complete recording replaces the folder of an earlier one, if it has no other files; an incomplete one is kept beside
+/// it as DIR.incomplete. A name ending in .mcap is a file instead: colour as CompressedImage (PNG), depth
 /// as compressedDepth (millimetres), each with an uncalibrated CameraInfo.
 #[derive(Args, Debug)]
 #[command(after_help = "\

@@ -183,7 +183,6 @@ impl StreamCommand {
         let options::Streaming { stream, output, .. } = &self.parts;
         let Opened { info, options, pace, .. } = opened;
         let sink_options = sink::Options {
-            frames: info.frames,
             force: output.force,
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,

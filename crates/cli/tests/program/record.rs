@@ -106,47 +106,36 @@ fn a_source_that_fails_leaves_the_old_recording() {
 }
 
 #[test]
-fn only_what_the_old_lists_name_goes() {
+fn only_a_recording_of_our_own_is_replaced() {
     let home = Home::new();
     let at = |name: &str| home.path(name);
     recording(&at("source"), 2, 50, 1.0);
-    // A recording by another program: named by time, with additional lists and files.
     recording(&at("old"), 3, 200, 2.0);
-    fs::remove_file(at("old/.bokehcam")).unwrap();
-    fs::rename(at("old/rgb/000002.png"), at("old/rgb/0.2.png")).unwrap();
-    let lists = fs::read_to_string(at("old/rgb.txt")).unwrap();
-    fs::write(at("old/rgb.txt"), lists.replace("000002", "0.2") + "9.0 notes.txt\n9.1 ../outside.png\n").unwrap();
-    let foreign = ["old/rgb/1234.png", "old/notes.txt", "old/groundtruth.txt", "outside.png"];
-    foreign.iter().for_each(|name| fs::write(at(name), "mine").unwrap());
-
     let ran = home.run(&["record", "source", "--to", "old"]);
     assert!(ran.code == 1 && ran.stderr.contains("--force"), "{}", ran.stderr);
-    assert_eq!(read_sloppily(&at("old")), 3);
+
+    // A file of somebody else, and one with the name of a picture.
+    for foreign in ["old/groundtruth.txt", "old/rgb/000003.png"] {
+        fs::write(at(foreign), "mine").unwrap();
+        let before = all(home.0.path());
+        let ran = home.run(&["record", "source", "--to", "old", "--force"]);
+        ran.failed(1, &[&format!("{foreign} was not written by bokehcam")]);
+        assert_eq!(all(home.0.path()), before);
+        fs::remove_file(at(foreign)).unwrap();
+    }
+    // A recording by another program.
+    let list = fs::read(at("old/.bokehcam")).unwrap();
+    fs::remove_file(at("old/.bokehcam")).unwrap();
+    home.run(&["record", "source", "--to", "old", "--force"]).failed(1, &["was not written by bokehcam"]);
+    assert_eq!(read(&at("old")), (3, 200));
+    fs::write(at("old/.bokehcam"), list).unwrap();
+
     let ran = home.run(&["record", "source", "--to", "old", "--force"]);
     ran.done();
     // The 8 files are three pictures, three depth maps and two lists.
     assert!(ran.stderr.contains("2 frames recorded") && ran.stderr.contains("in place of 8 files"), "{}", ran.stderr);
     assert_eq!(read(&at("old")), (2, 50));
-    let ours = ["depth.txt", "depth/000000.png", "depth/000001.png", "rgb.txt", "rgb/000000.png", "rgb/000001.png"];
-    let mut expected: Vec<_> =
-        ours.iter().chain(&["groundtruth.txt", "notes.txt", "rgb/1234.png"]).map(|s| s.to_string()).collect();
-    expected.sort();
-    assert_eq!(names(&at("old")), expected);
-    assert!(foreign.iter().all(|name| fs::read(at(name)).unwrap() == b"mine"));
-
-    // A foreign file with the name of a new picture is not overwritten.
-    fs::write(at("old/rgb/000002.png"), "mine").unwrap();
-    recording(&at("longer"), 3, 70, 1.0);
-    let ran = home.run(&["record", "longer", "--to", "old", "--force"]);
-    assert!(ran.code == 1 && ran.stderr.contains("old/rgb/000002.png was not written by"), "{}", ran.stderr);
-    assert_eq!(read(&at("old")), (2, 50));
-}
-
-/// Counts the readable frames of a recording with faulty lists.
-fn read_sloppily(dir: &Path) -> usize {
-    let recording = Recording::open(dir, &Options { keep_going: true, ..Options::default() }).unwrap();
-    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    (0..recording.len()).filter(|&frame| recording.read_color(frame, &mut scratch, &mut image).is_ok()).count()
+    assert_eq!((names(&at("old")).len(), fs::read_dir(home.0.path()).unwrap().count()), (6, 2));
 }
 
 /// Starts `record`, and waits for some frames in `place`.
@@ -168,23 +157,22 @@ fn a_recording_that_is_cut_short_is_readable() {
     let endless = ["record", "synthetic", "--size", "64x48", "--to", "old", "--force"];
     let long = [&endless[..], &["--frames", "1000000"]].concat();
 
-    let ran = begun(&home, &long, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
+    let ran = begun(&home, &long, at("old.incomplete/rgb")).end_by(Signal::INT, HANG);
     ran.done();
     assert!(ran.stderr.contains("old: unchanged") && ran.stderr.contains("are in old.incomplete"), "{}", ran.stderr);
     assert_eq!(all(&at("old")), before);
     assert!(read(&at("old.incomplete")).0 >= 3);
 
-    // After a kill, the next run keeps the frames of the killed one.
-    drop(begun(&home, &long, at("old/.bokehcam.part/rgb")));
-    let once = [&endless[..], &["--frames", "1"]].concat();
-    let ran = home.run(&once);
-    ran.done();
-    assert!(ran.stderr.contains("is kept as old.incomplete.2"), "{}", ran.stderr);
+    // After a kill, too.
+    drop(begun(&home, &long, at("old.incomplete.2/rgb")));
+    assert_eq!(all(&at("old")), before);
     assert!(read(&at("old.incomplete.2")).0 >= 2);
+    let once = [&endless[..], &["--frames", "1"]].concat();
+    home.run(&once).done();
     assert_eq!(read(&at("old")).0, 1);
 
     // An endless source ends by a signal.
-    let ran = begun(&home, &endless, at("old/.bokehcam.part/rgb")).end_by(Signal::INT, HANG);
+    let ran = begun(&home, &endless, at("old.incomplete.3/rgb")).end_by(Signal::INT, HANG);
     ran.done();
     assert!(ran.stderr.contains("in place of 4 files"), "{}", ran.stderr);
     assert!(read(&at("old")).0 >= 3);
