@@ -1,6 +1,6 @@
 //! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
-//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`] columns and rows, and [`MAX_PIXELS`].
+//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`](super::MAX_SIDE_PX) columns and rows, and [`MAX_PIXELS`].
 //! Besides the pixels, a PNG needs one row; a JPEG needs three times the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per
 //! pixel; other files need what `decoders` allows.
 
@@ -11,7 +11,10 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageFormat};
 
-use super::decoders::{create_decoder, create_jpeg_decoder, create_png_decoder, decode_with, guard, sample_format};
+use super::MAX_PIXELS;
+use super::decoders::{
+    PICTURES, check_size, create_decoder, create_jpeg_decoder, create_png_decoder, decode_with, guard, sample_format,
+};
 use super::fault::{PictureFault, decoder_fault, open_fault, png_fault};
 use super::file_kind::{self, FileKind};
 use super::heif;
@@ -19,11 +22,7 @@ use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
 use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
-use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::files::input;
-
-/// What a message names where no picture is found.
-pub(super) const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
 
 /// Far more than a photograph of [`MAX_PIXELS`] needs.
 const MAX_JPEG_BYTES: u64 = 192 << 20;
@@ -248,6 +247,12 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
     Ok(orientation?.unwrap_or(Orientation::NoTransforms))
 }
 
+/// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.
+pub(super) fn read_stored_orientation(path: &Path) -> Option<Orientation> {
+    let is_converted = read_kind(path)? == file_kind::HEIC;
+    read_orientation(path).ok().filter(|_| !is_converted)
+}
+
 /// Returns the kind of a file by its first bytes; `None` if it is unknown or cannot be read.
 pub(super) fn read_kind(path: &Path) -> Option<FileKind> {
     open_detected(path).ok()?.1
@@ -274,15 +279,4 @@ fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Resu
     file.rewind()?;
     file.take(max_bytes).read_to_end(memory)?;
     Ok(memory)
-}
-
-pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
-    let pixels = u64::from(width) * u64::from(height);
-    if width > MAX_SIDE_PX || height > MAX_SIDE_PX || pixels > MAX_PIXELS {
-        Err(PictureFault::TooLarge { width, height })
-    } else if width == 0 || height == 0 {
-        Err(PictureFault::NoPixel { width, height })
-    } else {
-        Ok(())
-    }
 }

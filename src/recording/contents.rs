@@ -1,16 +1,20 @@
 //! The common form of all layouts: frames whose pictures are still on disk.
 
 use std::collections::{HashMap, HashSet};
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::container::Container;
-use super::decode::DepthUnits;
+use super::coded::EncodedPicture;
+use super::decode::{self, DepthUnits, Scratch};
+use super::decoders::check_size;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault};
+use super::raw_image::{self, RawImage};
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
 use crate::calibration::registration::RgbdCalibration;
+use crate::frame::{ColorImage, DepthMap};
 use crate::optics::StereoRig;
 
 /// A recording layout: its detection and its reader.
@@ -53,6 +57,62 @@ pub(super) struct Contents {
     pub(super) maps_root: Option<PathBuf>,
     /// The pictures of a recording in a single file; those of the frames then only have names for messages.
     pub(super) container: Option<Box<dyn Container>>,
+}
+
+/// The pictures of a recording in a single file, by the number of their frame, which must exist. Several threads may
+/// read at once.
+pub(super) trait Container: Debug + Send + Sync {
+    /// Reads a colour picture as it is stored, into `bytes`.
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault>;
+
+    /// Reads depth in metres, 0 = unknown. Rejects a map that does not cover the view of a picture of `size`: that of the
+    /// colour camera, or of the depth camera if there is a calibration.
+    fn read_depth(
+        &self,
+        frame: usize,
+        size: (u32, u32),
+        scratch: &mut Scratch,
+        into: &mut DepthMap,
+    ) -> Result<(), PictureFault>;
+
+    /// Reads width and height of a colour picture.
+    fn read_size(&self, frame: usize) -> Result<(u32, u32), PictureFault> {
+        let size = match self.read_stored_color(frame, &mut Vec::new())? {
+            StoredColor::Encoded(data) => EncodedPicture::open_bytes(data)?.size(),
+            StoredColor::Raw(image) | StoredColor::Nv12(image) => image.size,
+        };
+        check_size(size.0, size.1).map(|()| size)
+    }
+
+    /// Reads a colour picture. Rejects one whose size is not `expected`.
+    fn read_color(
+        &self,
+        frame: usize,
+        expected: (u32, u32),
+        scratch: &mut Scratch,
+        into: &mut ColorImage,
+    ) -> Result<(), PictureFault> {
+        match self.read_stored_color(frame, &mut scratch.file)? {
+            StoredColor::Encoded(data) => {
+                let coded = EncodedPicture::open_bytes(data)?;
+                decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
+            }
+            StoredColor::Raw(image) => {
+                decode::check_color_size(image.size, expected)?;
+                raw_image::decode_color(&image, into)
+            }
+            StoredColor::Nv12(image) => raw_image::decode_nv12(&image, into),
+        }
+    }
+}
+
+/// A colour picture in a recording's file.
+pub(super) enum StoredColor<'a> {
+    /// A PNG or JPEG.
+    Encoded(&'a [u8]),
+    Raw(RawImage<'a>),
+    /// [`raw_image::decode_nv12`] decodes it.
+    Nv12(RawImage<'a>),
 }
 
 /// A frame of a list. Known times increase strictly.
@@ -201,24 +261,30 @@ impl PictureSource {
     }
 }
 
-/// Returns the size of the first colour picture with a readable header, or else the error of the first one.
+/// Returns the size of the first colour picture with a readable header, or else the error of the first one. `colors`
+/// names the colour pictures of all frames.
 pub(super) fn read_first_size<'a>(
     folder: &RecordingFolder,
+    container: Option<&dyn Container>,
     colors: impl Iterator<Item = &'a PictureSource>,
     read_size: fn(&Path) -> Result<(u32, u32), PictureFault>,
 ) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name an unreadable file many times: open it once.
     let mut unreadable = HashSet::new();
-    for source in colors {
-        let size = locator.locate(source).and_then(|path| {
-            if unreadable.contains(&path) {
-                return Ok(None);
-            }
-            let size = read_size(&path).map_err(|fault| source.error(&folder.dir, fault));
-            unreadable.insert(path);
-            size.map(Some)
-        });
+    for (frame, source) in colors.enumerate() {
+        let fault = |fault| source.error(&folder.dir, fault);
+        let size = match container {
+            Some(container) => container.read_size(frame).map(Some).map_err(fault),
+            None => locator.locate(source).and_then(|path| {
+                if unreadable.contains(&path) {
+                    return Ok(None);
+                }
+                let size = read_size(&path).map_err(fault);
+                unreadable.insert(path);
+                size.map(Some)
+            }),
+        };
         match size {
             Ok(Some(size)) => return Ok(size),
             Ok(None) => {}

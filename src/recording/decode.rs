@@ -78,6 +78,16 @@ pub(super) fn read_color(
     }
 }
 
+/// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag, which is then upright.
+pub(super) fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), PictureFault> {
+    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
+    let mut metadata = read_color(path, None, &mut scratch, &mut image)?;
+    drop(scratch);
+
+    let orientation = metadata.take_orientation();
+    Ok((upright(orientation).transform_color(image), metadata))
+}
+
 /// Decodes as [`decode_color`] does, but rejects a picture whose size is not `expected` before.
 pub(super) fn decode_color_of_size(
     coded: EncodedPicture,

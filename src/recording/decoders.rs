@@ -5,8 +5,6 @@ use std::io::{BufRead, BufReader, Seek};
 
 use image::{ColorType, ImageDecoder, ImageFormat, ImageReader};
 
-use super::MAX_PIXELS;
-use super::coded::{PICTURES, check_size};
 use super::fault::{PictureFault, decoder_fault, png_fault};
 use super::file_kind::{self, FileKind};
 use super::jpeg;
@@ -15,13 +13,29 @@ use super::strict_jpeg::StrictJpeg;
 use super::tiff_directory::is_raw_tiff;
 use super::tiff_file::{TiffPhotoDecoder, Undecoded};
 use super::tiff_form::{SAVE_PHOTO, TiffForm};
+use super::{MAX_PIXELS, MAX_SIDE_PX};
 use crate::compute::catch_panic;
+
+/// What a message names where no picture is found.
+pub(super) const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
 
 /// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
 
 /// Memory limit for other files with their pixels: enough for [`MAX_PIXELS`] of four 16-bit channels.
 const MAX_DECODER_BYTES: u64 = 8 * MAX_PIXELS + (64 << 20);
+
+/// Rejects a size beyond the limits, before memory is allocated for it.
+pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
+    let pixels = u64::from(width) * u64::from(height);
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX || pixels > MAX_PIXELS {
+        Err(PictureFault::TooLarge { width, height })
+    } else if width == 0 || height == 0 {
+        Err(PictureFault::NoPixel { width, height })
+    } else {
+        Ok(())
+    }
+}
 
 /// Runs a decoder: if it panics, the file is damaged. What it was decoding into is then unspecified.
 pub(super) fn guard<T>(decode: impl FnOnce() -> Result<T, PictureFault>) -> Result<T, PictureFault> {

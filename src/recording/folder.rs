@@ -5,8 +5,8 @@ use std::collections::hash_map::Entry;
 use std::fs;
 use std::path::Path;
 
+use super::MAX_ENTRIES;
 use super::error::RecordingError;
-use super::list::MAX_ENTRIES;
 
 /// Endings of pictures.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];

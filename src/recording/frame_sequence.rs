@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
-use super::tum::Seconds;
+use super::time::Seconds;
 use super::{MAX_SIDE_PX, depth_covers};
 use crate::frame::{ColorImage, DepthMap};
 

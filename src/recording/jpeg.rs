@@ -3,6 +3,7 @@
 use std::io::{BufReader, ErrorKind, Read, Seek};
 
 use super::fault::PictureFault;
+use super::jpeg_repair::{marker, next_segment};
 use super::samples::SampleFormat;
 
 /// Maximum number of segments before the frame header; cameras write some tens.
@@ -121,18 +122,12 @@ pub(super) fn is_complete(bytes: &[u8]) -> bool {
 
 /// Returns the number of bytes up to the end marker (EOI), which a truncated file lacks; other data may follow it.
 pub(super) fn find_end(bytes: &[u8]) -> Option<usize> {
-    const START: u8 = 0xD8;
-    const END: u8 = 0xD9;
     let mut rest = bytes;
     loop {
-        // Coded data has its FF bytes stuffed with 00 or is split by restart markers; FF may also pad a marker.
-        let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))?;
-        let (marker, after) = (rest[at + 1], &rest[at + 2..]);
-        rest = match marker {
-            END => return Some(bytes.len() - after.len()),
-            START | 0x01 => after,
-            // Skip a segment by its length, as its content may look like markers.
-            _ => after.get(usize::from(u16::from_be_bytes(*after.first_chunk()?))..)?,
-        };
+        let (code, _, after) = next_segment(rest)?;
+        if code == marker::EOI {
+            return Some(bytes.len() - after.len());
+        }
+        rest = after;
     }
 }

@@ -4,14 +4,12 @@ use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use super::MAX_ENTRIES;
 use super::contents::{ListPosition, PictureSource};
 use super::error::RecordingError;
 use super::fault::LineFault;
 use super::timeline::MAX_LENGTH_NS;
 use crate::files::{atomic_file, input};
-
-/// Maximum number of lines: nine hours at 30 frames per second.
-pub(super) const MAX_ENTRIES: usize = 1_000_000;
 
 /// Maximum number of characters that messages quote of faulty text.
 const QUOTED_CHARS: usize = 40;

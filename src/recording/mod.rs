@@ -16,7 +16,6 @@ pub mod tum;
 
 mod calib;
 mod coded;
-mod container;
 mod contents;
 mod decode;
 mod decoders;
@@ -54,6 +53,7 @@ mod strict_jpeg;
 mod tiff_directory;
 mod tiff_file;
 mod tiff_form;
+mod time;
 mod timeline;
 mod unit;
 mod upright;
@@ -62,7 +62,6 @@ mod xmp;
 
 use std::path::Path;
 
-pub use container::is_recording_file;
 pub use decode::Scratch;
 pub use depth_file::{DepthUnit, covers as depth_covers};
 pub use error::RecordingError;
@@ -77,8 +76,7 @@ use crate::calibration::StereoCalibration;
 use crate::calibration::registration::Registration;
 use crate::frame::{ColorImage, GrayImage};
 use crate::optics::StereoRig;
-use container::Container;
-use contents::{DepthFormat, Layout, PictureSource, RecordingFolder};
+use contents::{Container, DepthFormat, Layout, PictureSource, RecordingFolder};
 
 /// The supported layouts, in order of detection.
 const LAYOUTS: [Layout; 9] = [
@@ -98,6 +96,9 @@ const LAYOUTS: [Layout; 9] = [
 const MAX_SIDE_PX: u32 = 16384;
 /// Maximum number of pixels: cameras have up to 102 megapixels.
 const MAX_PIXELS: u64 = 120_000_000;
+
+/// Maximum number of pictures in a recording: nine hours at 30 frames per second.
+const MAX_ENTRIES: usize = 1_000_000;
 
 /// Counts of listed pictures that belong to no frame, because no counterpart is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -155,6 +156,11 @@ struct Frame {
     depth: Option<PictureSource>,
 }
 
+/// Returns whether a file is a recording by itself.
+pub fn is_recording_file(path: &Path) -> bool {
+    path.is_file() && [mcap::LAYOUT, record3d::LAYOUT, kinect::LAYOUT].iter().any(|layout| (layout.matches)(path))
+}
+
 impl Recording {
     /// Opens the recording in the folder or file `dir`, or the pictures of a pattern such as `DIR/IMG_%04d.jpg`. Reads
     /// its lists, and the headers of pictures where needed.
@@ -185,10 +191,7 @@ impl Recording {
         folder.maps_root = contents.maps_root;
         let sources = contents.frames.iter().map(|frame| &frame.color);
         let read_size = if contents.are_photos { decode::read_upright_size } else { decode::read_size };
-        let size = match &contents.container {
-            Some(container) => container::read_first_size(container.as_ref(), dir, sources)?,
-            None => contents::read_first_size(&folder, sources, read_size)?,
-        };
+        let size = contents::read_first_size(&folder, contents.container.as_deref(), sources, read_size)?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
         let frames: Vec<_> = listed

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::coded::check_size;
 use super::decode::Scratch;
+use super::decoders::check_size;
 use super::depth_covers;
 use super::fault::PictureFault;
 use super::unit::MapUnit;

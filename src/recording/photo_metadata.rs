@@ -3,9 +3,24 @@
 use image::ImageDecoder;
 use image::metadata::Orientation;
 
-use super::still::PhotoFormat;
+use super::tiff_directory::TiffDirectories;
 use super::{icc, image_resources, xmp};
 use crate::compute::catch_panic;
+use crate::names;
+
+names::named! {
+    /// A file format for pictures, by the extension of its files.
+    pub enum PhotoFormat default Png {
+        /// Lossless
+        Png = "png",
+        /// Lossy, and smaller; 8 bits without alpha
+        Jpeg = "jpg",
+        /// Lossless
+        Tiff = "tif",
+        /// Lossless, and small; 8 bits
+        WebP = "webp",
+    }
+}
 
 /// Metadata of a picture, and what was lost on reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -155,30 +170,14 @@ fn exif_of_orientation(orientation: Orientation) -> Vec<u8> {
 fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
     const THUMBNAIL_OFFSET: u16 = 0x0201;
     const THUMBNAIL_LENGTH: u16 = 0x0202;
-    let is_big_endian = match exif.first_chunk()? {
-        b"MM\0*" => true,
-        b"II*\0" => false,
-        _ => return None,
-    };
-    let u16_at = |exif: &[u8], at: usize| {
-        let bytes = *exif.get(at..)?.first_chunk()?;
-        Some(if is_big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
-    };
-    let u32_at = |exif: &[u8], at: usize| {
-        let bytes = *exif.get(at..)?.first_chunk()?;
-        Some(if is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) } as usize)
-    };
-    let first = u32_at(exif, 4)?;
-    let next_link = first + 2 + 12 * usize::from(u16_at(exif, first)?);
+    let file = TiffDirectories::parse(exif)?;
+    let first = file.u32_at(4)?;
+    let next_link = first + 2 + 12 * usize::from(file.u16_at(first)?);
     // A single directory may lack the offset of the next one.
-    let Some(second) = u32_at(exif, next_link).filter(|&second| second != 0) else { return Some(()) };
-    let entries = usize::from(u16_at(exif, second)?);
-    exif.get(second + 2..second + 2 + 12 * entries)?;
-    let value = |exif: &[u8], tag: u16| {
-        let entry = (0..entries).map(|entry| second + 2 + 12 * entry).find(|&at| u16_at(exif, at) == Some(tag))?;
-        u32_at(exif, entry + 8)
-    };
-    if let Some((offset, length)) = value(exif, THUMBNAIL_OFFSET).zip(value(exif, THUMBNAIL_LENGTH)) {
+    let Some(second) = file.u32_at(next_link).filter(|&second| second != 0) else { return Some(()) };
+    exif.get(second + 2..second + 2 + 12 * usize::from(file.u16_at(second)?))?;
+    let value = |tag| file.u32_at(file.find_tag(second, tag)? + 8);
+    if let Some((offset, length)) = value(THUMBNAIL_OFFSET).zip(value(THUMBNAIL_LENGTH)) {
         exif.get_mut(offset..offset.checked_add(length)?)?.fill(0);
     }
     exif[next_link..next_link + 4].fill(0);

@@ -1,8 +1,8 @@
 //! Pixels without compression inside a file, by the names that ROS has for their formats
 //! (`sensor_msgs/image_encodings.hpp`).
 
-use super::coded::check_size;
 use super::decode::DepthUnits;
+use super::decoders::check_size;
 use super::fault::PictureFault;
 use crate::color::YcbcrMatrix;
 use crate::frame::{ColorImage, DepthMap};

@@ -7,21 +7,18 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use image::ImageFormat;
-use image::metadata::Orientation;
 
-use super::decode::{self, Scratch};
 use super::depth_file::{self, Distances};
 use super::encode::Raster;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
+pub use super::photo_metadata::PhotoFormat;
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
-use super::upright::upright;
-use super::{check_depth_scale, coded, depth_covers, encode, pfm, tiff_file};
+use super::{check_depth_scale, coded, decode, depth_covers, encode, pfm, tiff_file};
 use crate::files::atomic_file;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
-use crate::names;
 use crate::optics::StereoRig;
 
 /// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
@@ -38,27 +35,7 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 /// # Errors
 /// Same as for [`read_color`].
 pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingError> {
-    read_with_metadata(path).map_err(RecordingError::picture(path))
-}
-
-/// Does the same as [`read_color`].
-pub(super) fn read_upright(path: &Path) -> Result<ColorImage, PictureFault> {
-    read_with_metadata(path).map(|(image, _)| image)
-}
-
-fn read_with_metadata(path: &Path) -> Result<(ColorImage, PhotoMetadata), PictureFault> {
-    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    let mut metadata = decode::read_color(path, None, &mut scratch, &mut image)?;
-    drop(scratch);
-
-    let orientation = metadata.take_orientation();
-    Ok((upright(orientation).transform_color(image), metadata))
-}
-
-/// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.
-pub(super) fn read_orientation(path: &Path) -> Option<Orientation> {
-    let is_converted = coded::read_kind(path)? == file_kind::HEIC;
-    coded::read_orientation(path).ok().filter(|_| !is_converted)
+    decode::read_photo(path).map_err(RecordingError::picture(path))
 }
 
 /// Reads columns and rows of a PNG or JPEG from its header only, before its orientation tag turns it.
@@ -162,20 +139,6 @@ pub(super) fn write_raster(
         PhotoFormat::WebP => encode::encode_photo_webp(raster, metadata, &mut file).map_err(|error| error.to_string()),
     };
     write(path, encoded, &file, force)
-}
-
-names::named! {
-    /// A file format for pictures, by the extension of its files.
-    pub enum PhotoFormat default Png {
-        /// Lossless
-        Png = "png",
-        /// Lossy, and smaller; 8 bits without alpha
-        Jpeg = "jpg",
-        /// Lossless
-        Tiff = "tif",
-        /// Lossless, and small; 8 bits
-        WebP = "webp",
-    }
 }
 
 /// Returns the picture format for a file name.

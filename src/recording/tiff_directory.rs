@@ -1,4 +1,5 @@
-//! Directories of TIFF files, which EXIF and Multi-Picture files have as well (TIFF 6.0, section 2).
+//! Directories of TIFF files, which EXIF and Multi-Picture files have as well (TIFF 6.0, section 2). The crates `nom-exif`,
+//! which only reads, and `little_exif`, which writes EXIF anew, cannot change a picture's own in place.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -35,10 +36,9 @@ impl<'a> TiffDirectories<'a> {
         Some(if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) } as usize)
     }
 
-    /// Returns the position of a tag's entry in the first directory. An entry has the tag (2 bytes), the type (2), the
+    /// Returns the position of a tag's entry in the directory at a position. An entry has the tag (2 bytes), the type (2), the
     /// number of values (4), and the values or their position (4).
-    pub(super) fn find_tag(&self, tag: u16) -> Option<usize> {
-        let directory = self.u32_at(4)?;
+    pub(super) fn find_tag(&self, directory: usize, tag: u16) -> Option<usize> {
         let entries = (0..usize::from(self.u16_at(directory)?)).map(|entry| directory + 2 + 12 * entry);
         entries.into_iter().find(|&at| self.u16_at(at) == Some(tag))
     }
@@ -70,7 +70,7 @@ pub(super) fn is_raw_tiff(file: &mut File) -> Result<bool, PictureFault> {
     file.take(MAX_TIFF_START_BYTES).read_to_end(&mut start)?;
     file.rewind()?;
     let Some(directory) = TiffDirectories::parse(&start) else { return Ok(false) };
-    let value_at = |tag| directory.find_tag(tag).map(|at| at + 8);
+    let value_at = |tag| directory.find_tag(directory.u32_at(4)?, tag).map(|at| at + 8);
     let is_reduced = value_at(SUBFILE_TYPE).and_then(|at| directory.u32_at(at)).is_some_and(|kind| kind & REDUCED != 0);
     let is_undeveloped = value_at(PHOTOMETRIC).and_then(|at| directory.u16_at(at)) == Some(COLOR_FILTER_ARRAY);
     Ok(is_reduced || is_undeveloped || value_at(DNG_VERSION).is_some())

@@ -1,7 +1,6 @@
 //! Times and frame period of a recording.
 
-use super::Options;
-use super::list::MAX_ENTRIES;
+use super::{MAX_ENTRIES, Options};
 
 /// Period of a recording with fewer than two known times: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;

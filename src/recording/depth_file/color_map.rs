@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::values::{Samples, Values};
+use crate::recording::decode;
 use crate::recording::fault::PictureFault;
-use crate::recording::still;
 
 /// 256 colours of each map, from 0 to 255, as R, G, B: matplotlib's `colormaps[NAME](range(256), bytes=True)`. The first four
 /// are in the public domain (CC0), turbo is by Google and Spectral by ColorBrewer (both Apache-2.0).
@@ -45,7 +45,7 @@ pub(super) struct ColorMapped {
 /// It has other colours.
 pub(super) fn read(path: &Path) -> Result<ColorMapped, PictureFault> {
     // What is no picture, but has colours, has none of these.
-    let picture = still::read_upright(path).map_err(|_| PictureFault::ColoredDepth)?;
+    let (picture, _) = decode::read_photo(path).map_err(|_| PictureFault::ColoredDepth)?;
     let pixels = picture.rgb.as_chunks::<3>().0;
     let numbers_of = |map: &[[u8; 3]]| {
         let mut numbers = HashMap::new();
@@ -81,6 +81,7 @@ fn find_nearest(map: &[[u8; 3]], color: [u8; 3]) -> Option<u8> {
 mod tests {
     use super::*;
     use crate::frame::ColorImage;
+    use crate::recording::still;
 
     /// Writes a ramp in the colours of a map, each channel off by at most `off`, and reads it.
     fn ramp(at: usize, steps: usize, off: i16) -> Result<ColorMapped, PictureFault> {

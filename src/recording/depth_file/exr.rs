@@ -13,7 +13,7 @@ use exr::prelude::f16;
 
 use super::values::{ColorCount, Samples, Values};
 use crate::recording::MAX_PIXELS;
-use crate::recording::coded::check_size;
+use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
 
 /// Names of a channel with depth, in order of preference: the standard's, those of renderers, grey, and colours.

@@ -7,11 +7,11 @@ use image::metadata::Orientation;
 use super::values::{Values, decode_codes};
 use super::{DepthFile, Distances, fit, meaning};
 use crate::frame::{ColorImage, DepthMap};
-use crate::recording::coded::EncodedPicture;
+use crate::recording::coded::{self, EncodedPicture};
 use crate::recording::embedded::{self, EmbeddedDepth, Focus};
 use crate::recording::fault::PictureFault;
 use crate::recording::upright::upright;
-use crate::recording::{PhotoMetadata, RecordingError, decode, still};
+use crate::recording::{PhotoMetadata, RecordingError, decode};
 
 /// A photo with its own depth.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub fn read_inside(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>
 fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFault> {
     let Some(found) = embedded::read(path)? else { return Ok(None) };
     // Map, original and focus belong to the picture as stored; HEIC is upright once it is converted.
-    let orientation = still::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    let orientation = coded::read_stored_orientation(path).unwrap_or(Orientation::NoTransforms);
     let EmbeddedDepth { kind, map, meaning, is_metric, focus, original } = found;
     let broken =
         |what: &str, fault: &PictureFault| PictureFault::EmbeddedDepth { kind, what: format!("{what}: {fault}") };

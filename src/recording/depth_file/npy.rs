@@ -1,5 +1,6 @@
 //! Arrays of NumPy: `.npy` ("NPY format", numpy.org/doc/stable/reference/generated/numpy.lib.format.html), and the first
-//! map in a `.npz`, which is a zip of them.
+//! map in a `.npz`, which is a zip of them. The crate `npyz` brings 14 packages, and multiplies the sides of a hostile header
+//! without a check.
 
 use std::fs::File;
 use std::io::Read;
@@ -9,7 +10,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::values::{Samples, Values};
-use crate::recording::coded::check_size;
+use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
 
 /// Longest header that is read; those of arrays without named fields have 128 bytes.

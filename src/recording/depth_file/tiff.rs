@@ -9,7 +9,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
 use super::values::{ColorCount, Samples, Values};
-use crate::recording::coded::check_size;
+use crate::recording::decoders::check_size;
 use crate::recording::fault::{PictureFault, damaged_fault};
 use crate::recording::tiff_form::{SAVE_MAP, TiffForm};
 

@@ -57,7 +57,7 @@ struct Entry {
 /// Reads the entries of an index, which has the form of a TIFF directory.
 fn read_entries(index: &[u8]) -> Option<Vec<Entry>> {
     let index = TiffDirectories::parse(index)?;
-    let list = index.find_tag(ENTRIES_TAG)?;
+    let list = index.find_tag(index.u32_at(4)?, ENTRIES_TAG)?;
     let (bytes, start) = (index.u32_at(list + 4)?, index.u32_at(list + 8)?);
     let entries = (0..(bytes / ENTRY_BYTES).min(MAX_PICTURES)).map(|entry| start + ENTRY_BYTES * entry);
     let read = |at| {

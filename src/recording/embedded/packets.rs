@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::io::Cursor;
 
-use super::super::{coded, jpeg, xmp};
+use super::super::{decoders, jpeg, xmp};
 use crate::compute::catch_panic;
 
 /// Identifier at the start of a JPEG segment with a piece of Extended XMP. After it: GUID (32 bytes), length of the whole
@@ -103,7 +103,7 @@ fn read_png(file: &[u8]) -> Option<Vec<u8>> {
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(file), limits);
     decoder.set_ignore_iccp_chunk(true);
     let (width, height) = decoder.read_header_info().ok()?.size();
-    coded::check_size(width, height).ok()?;
+    decoders::check_size(width, height).ok()?;
     let reader = decoder.read_info().ok()?;
     let mut chunk = reader.info().utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD)?.clone();
     chunk.decompress_text_with_limit(xmp::MAX_BYTES).ok()?;

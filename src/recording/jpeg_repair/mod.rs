@@ -11,7 +11,7 @@
 
 mod tables;
 
-mod marker {
+pub(super) mod marker {
     pub const SOF: std::ops::RangeInclusive<u8> = 0xC0..=0xCF;
     pub const BASELINE: u8 = 0xC0;
     pub const EXTENDED: u8 = 0xC1;
@@ -157,7 +157,7 @@ impl Frame {
 
 /// Finds the next marker in `rest`, skipping other data; returns its code, the segment with the marker, and the
 /// remaining data. `None` if there is no marker or its segment is truncated.
-fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+pub(super) fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
     let (code, after) = (rest[at + 1], &rest[at + 2..]);
     if matches!(code, marker::SOI | marker::EOI | marker::TEM) || marker::RST.contains(&code) {

@@ -4,10 +4,9 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 
 use super::track::{Block, ColorFormat};
-use crate::frame::{ColorImage, DepthMap};
-use crate::recording::coded::{self, EncodedPicture};
-use crate::recording::container::Container;
-use crate::recording::decode::{self, DepthUnits, Scratch};
+use crate::frame::DepthMap;
+use crate::recording::contents::{Container, StoredColor};
+use crate::recording::decode::{DepthUnits, Scratch};
 use crate::recording::depth_covers;
 use crate::recording::fault::PictureFault;
 use crate::recording::raw_image::{self, DepthSamples, RawImage};
@@ -36,32 +35,15 @@ impl KinectFile {
 }
 
 impl Container for KinectFile {
-    fn read_size(&self, frame: usize) -> Result<(u32, u32), PictureFault> {
-        let size = match self.color_format {
-            ColorFormat::Jpeg => EncodedPicture::open_bytes(self.read(self.frames[frame].0, &mut Vec::new())?)?.size(),
-            _ => self.color_size,
-        };
-        coded::check_size(size.0, size.1).map(|()| size)
-    }
-
-    fn read_color(
-        &self,
-        frame: usize,
-        expected: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut ColorImage,
-    ) -> Result<(), PictureFault> {
-        let data = self.read(self.frames[frame].0, &mut scratch.file)?;
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+        let data = self.read(self.frames[frame].0, bytes)?;
         let (size, width) = (self.color_size, self.color_size.0 as usize);
         let raw = |format, stride_bytes| RawImage { size, format, is_big_endian: false, stride_bytes, data };
-        match self.color_format {
-            ColorFormat::Jpeg => {
-                let coded = EncodedPicture::open_bytes(data)?;
-                decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
-            }
-            ColorFormat::Nv12 => raw_image::decode_nv12(&raw("", width), into),
-            ColorFormat::Raw { name, pixel_bytes } => raw_image::decode_color(&raw(name, width * pixel_bytes), into),
-        }
+        Ok(match self.color_format {
+            ColorFormat::Jpeg => StoredColor::Encoded(data),
+            ColorFormat::Nv12 => StoredColor::Nv12(raw("", width)),
+            ColorFormat::Raw { name, pixel_bytes } => StoredColor::Raw(raw(name, width * pixel_bytes)),
+        })
     }
 
     fn read_depth(

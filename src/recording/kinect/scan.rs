@@ -2,7 +2,8 @@
 //!
 //! The pass reads the heads of elements and skips what is in them: some hundred bytes per picture. It needs no index,
 //! and does not believe the length of the whole, which is written last, so that a file that was cut short, or whose
-//! recorder was killed, is read up to its last whole picture.
+//! recorder was killed, is read up to its last whole picture. The crate `matroska-demuxer` refuses such files, reads the bytes
+//! of every picture to list them, and no attachments.
 
 use std::fs::File;
 use std::io;
@@ -12,7 +13,7 @@ use std::time::{Duration, Instant};
 use super::ebml::{self, Head};
 use super::track::{Block, Track};
 use crate::files::input::MAX_CALIBRATION_BYTES;
-use crate::recording::list::MAX_ENTRIES;
+use crate::recording::MAX_ENTRIES;
 
 /// The first bytes of a file: the ID of its first element.
 pub(super) const MAGIC: [u8; 4] = [0x1A, 0x45, 0xDF, 0xA3];

@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use super::cameras;
+use super::cameras::{self, Cameras};
+use super::chunk::Chunk;
 use super::fields::Fields;
 use super::message::{Encoding, Kind};
-use super::scan::Contents;
 use super::topic::Topic;
 
 /// Most topics with pictures, and of cameras; robots have some tens.
@@ -18,6 +18,20 @@ const MAX_NAME_BYTES: usize = 1024;
 const MAX_TYPE_CHARS: usize = 80;
 /// Number of topics without pictures that a message lists.
 const MAX_OTHERS: usize = 12;
+
+/// What a file contains.
+#[derive(Debug, Default)]
+pub(super) struct Contents {
+    /// Topics of messages with pictures.
+    pub topics: Vec<Topic>,
+    pub cameras: Cameras,
+    /// Compressed chunks.
+    pub chunks: Vec<Chunk>,
+    /// Some topics without pictures, with their types.
+    pub others: Vec<String>,
+    /// What is wrong with the file, if anything.
+    pub damage: Option<String>,
+}
 
 /// The channels that matter here.
 #[derive(Default)]

@@ -7,9 +7,9 @@ use super::chunk::{Chunk, ChunkCache};
 use super::message::Picture;
 use super::rvl;
 use super::topic::{Message, Topic};
-use crate::frame::{ColorImage, DepthMap};
-use crate::recording::coded::{self, EncodedPicture};
-use crate::recording::container::Container;
+use crate::frame::DepthMap;
+use crate::recording::coded::EncodedPicture;
+use crate::recording::contents::{Container, StoredColor};
 use crate::recording::decode::{self, DepthUnits, Scratch};
 use crate::recording::fault::PictureFault;
 use crate::recording::raw_image::{self, DepthSamples};
@@ -69,32 +69,11 @@ impl McapFile {
 }
 
 impl Container for McapFile {
-    fn read_size(&self, frame: usize) -> Result<(u32, u32), PictureFault> {
-        let mut bytes = Vec::new();
-        let size = match self.read_frame(frame, false, &mut bytes)?.0 {
-            Picture::Image(image) => image.size,
-            Picture::Compressed { data, .. } => EncodedPicture::open_bytes(data)?.size(),
-        };
-        coded::check_size(size.0, size.1).map(|()| size)
-    }
-
-    fn read_color(
-        &self,
-        frame: usize,
-        expected: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut ColorImage,
-    ) -> Result<(), PictureFault> {
-        match self.read_frame(frame, false, &mut scratch.file)?.0 {
-            Picture::Image(image) => {
-                decode::check_color_size(image.size, expected)?;
-                raw_image::decode_color(&image, into)
-            }
-            Picture::Compressed { data, .. } => {
-                let coded = EncodedPicture::open_bytes(data)?;
-                decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
-            }
-        }
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+        Ok(match self.read_frame(frame, false, bytes)?.0 {
+            Picture::Image(image) => StoredColor::Raw(image),
+            Picture::Compressed { data, .. } => StoredColor::Encoded(data),
+        })
     }
 
     fn read_depth(

@@ -3,8 +3,8 @@
 //! in groups of three bits with a flag for more.
 
 use crate::frame::DepthMap;
-use crate::recording::coded::check_size;
 use crate::recording::decode::{self, DepthUnits};
+use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
 
 /// Decodes a map to metres. Rejects one that does not cover a picture of `color` pixels.

@@ -2,19 +2,20 @@
 //!
 //! The pass needs no summary at the end of the file, so that a file that was cut short is read up to its last whole
 //! record. It skips what is in the messages: of a file without compression it reads some hundred bytes per picture.
-//! Compressed chunks are decompressed, because only a message itself has the time at which its picture was taken.
+//! Compressed chunks are decompressed, because only a message itself has the time at which its picture was taken. The crate
+//! `mcap` reads every message whole, ends at the first damage, and brings 15 packages.
 
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::time::{Duration, Instant};
 
-use super::cameras::{self, Cameras};
-use super::channels::{Channels, MAX_TOPICS};
+use super::cameras;
+use super::channels::{Channels, Contents, MAX_TOPICS};
 use super::chunk::Chunk;
 use super::fields::Fields;
 use super::message::{MAX_MESSAGE_BYTES, Preview};
-use super::topic::{Message, Topic};
-use crate::recording::list::MAX_ENTRIES;
+use super::topic::Message;
+use crate::recording::MAX_ENTRIES;
 
 /// The first and the last bytes of a file.
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -47,20 +48,6 @@ const BUFFER_BYTES: usize = 1 << 13;
 
 /// A pass that takes longer is reported.
 const SLOW: Duration = Duration::from_secs(2);
-
-/// What a file contains.
-#[derive(Debug, Default)]
-pub(super) struct Contents {
-    /// Topics of messages with pictures.
-    pub topics: Vec<Topic>,
-    pub cameras: Cameras,
-    /// Compressed chunks.
-    pub chunks: Vec<Chunk>,
-    /// Some topics without pictures, with their types.
-    pub others: Vec<String>,
-    /// What is wrong with the file, if anything.
-    pub damage: Option<String>,
-}
 
 /// The end of a part of the file.
 type End = Result<(), Damage>;

@@ -12,17 +12,16 @@ use std::sync::{Mutex, PoisonError};
 use lzfse_rust::LzfseRingDecoder;
 use zip::ZipArchive;
 
-use super::coded::EncodedPicture;
-use super::container::Container;
-use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
+use super::contents::{
+    Container, Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, StoredColor,
+};
 use super::decode::{self, DepthUnits, Scratch};
 use super::decoders::{guard, guard_as};
 use super::error::RecordingError;
 use super::fault::{PictureFault, damaged_fault};
-use super::list::MAX_ENTRIES;
-use super::{MAX_SIDE_PX, Options, Unpaired};
+use super::{MAX_ENTRIES, MAX_SIDE_PX, Options, Unpaired};
 use crate::files::input;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::DepthMap;
 use metadata::Metadata;
 
 pub(super) const LAYOUT: Layout =
@@ -137,19 +136,8 @@ impl Archive {
 }
 
 impl Container for Archive {
-    fn read_size(&self, frame: usize) -> Result<(u32, u32), PictureFault> {
-        Ok(EncodedPicture::open_bytes(self.read(&self.frames[frame].0, &mut Vec::new())?)?.size())
-    }
-
-    fn read_color(
-        &self,
-        frame: usize,
-        expected: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut ColorImage,
-    ) -> Result<(), PictureFault> {
-        let coded = EncodedPicture::open_bytes(self.read(&self.frames[frame].0, &mut scratch.file)?)?;
-        decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+        self.read(&self.frames[frame].0, bytes).map(StoredColor::Encoded)
     }
 
     fn read_depth(

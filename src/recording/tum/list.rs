@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::is_picture;
-use super::time::parse_ns;
 use crate::recording::contents::ListPosition;
 use crate::recording::error::RecordingError;
 use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, parse_relative_path, quote};
+use crate::recording::time::parse_ns;
 
 fn parse_entry(position: ListPosition, time: &str, file: &str) -> Entry {
     Entry::new(position, parse_ns(time).ok_or_else(|| LineFault::Time(quote(time))), parse_relative_path(file))

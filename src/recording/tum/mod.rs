@@ -10,14 +10,12 @@ mod associations;
 mod growing;
 mod list;
 mod open;
-mod time;
 mod writer;
 
 use std::path::Path;
 
 use super::contents::Layout;
 pub use super::frame_sequence::RecordingSummary;
-pub(super) use time::Seconds;
 pub use writer::{Writer, WriterOptions};
 
 /// Lists of colour pictures and depth maps.

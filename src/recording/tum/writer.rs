@@ -4,12 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::growing::GrowingList;
-use super::time::Seconds;
 use super::{COLOR_LIST, DEPTH_LIST};
 use crate::files::folder::{Folder, FolderError};
 use crate::frame::{ColorImage, DepthMap};
 use crate::recording::error::RecordingError;
 use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
+use crate::recording::time::Seconds;
 use crate::recording::{check_depth_scale, encode};
 
 const COLOR_FOLDER: &str = "rgb";

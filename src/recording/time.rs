@@ -20,7 +20,7 @@ pub(super) fn parse_ns(text: &str) -> Option<u64> {
 }
 
 /// Formats nanoseconds as exact decimal seconds.
-pub(in crate::recording) struct Seconds(pub(in crate::recording) u64);
+pub(super) struct Seconds(pub(super) u64);
 
 impl fmt::Display for Seconds {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
