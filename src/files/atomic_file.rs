@@ -87,7 +87,7 @@ impl PartFile {
     ///
     /// # Errors
     /// Same as for [`PartFile::commit`].
-    pub fn commit_unsynced(mut self) -> io::Result<()> {
+    pub(super) fn commit_unsynced(mut self) -> io::Result<()> {
         rename(&self.part, &self.path, false)?;
         self.remove_on_drop = false;
         Ok(())
@@ -200,6 +200,37 @@ pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
         }
     }
     Err(ErrorKind::AlreadyExists.into())
+}
+
+/// Keeps the files that killed runs left of `path` under the names of [`keep_incomplete`], which is logged.
+///
+/// # Errors
+/// Returns the error of the system.
+pub fn keep_leftovers(path: &Path) -> io::Result<()> {
+    // A folder may be writable without being readable.
+    for part in find_abandoned(path).unwrap_or_default() {
+        if let Some(kept) = keep_or_remove_part(&part, path)? {
+            tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
+        }
+    }
+    Ok(())
+}
+
+/// Renames an abandoned part to `path` with `.incomplete` in the name, and returns that name; removes an empty one.
+///
+/// # Errors
+/// Returns the error of the system.
+pub fn keep_or_remove_part(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
+    let done = match part.metadata().map(|part| part.len()) {
+        Ok(0) => fs::remove_file(part).map(|()| None),
+        Ok(_) => keep_incomplete(part, path).map(Some),
+        Err(error) => Err(error),
+    };
+    match done {
+        // Another process did the same at the same time.
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        done => done,
+    }
 }
 
 /// Returns the bytes that this process has written so far for a file at `path`; `None` if it writes no such file.

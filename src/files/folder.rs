@@ -18,7 +18,7 @@ use super::atomic_file::{PartFile, is_part_name, sync_folder};
 use super::{input, lock};
 
 /// The name of the list of our own files.
-pub const LIST_NAME: &str = ".bokehcam";
+const LIST_NAME: &str = ".bokehcam";
 
 /// An error in writing a folder.
 #[derive(Debug, thiserror::Error)]

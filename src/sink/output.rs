@@ -33,9 +33,7 @@ impl OutputFile {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             fs::create_dir_all(folder).map_err(SinkError::write(folder))?;
         }
-        for kept in keep_leftovers(path)? {
-            tracing::warn!("{}: the unfinished output of an earlier run is kept as {}", path.display(), kept.display());
-        }
+        atomic_file::keep_leftovers(path).map_err(SinkError::write(path))?;
         let part = PartFile::create(path).map_err(SinkError::write(path))?;
         Ok(Self { path: path.to_owned(), force, part: Some(part), frames: 0 })
     }
@@ -140,32 +138,10 @@ fn keep_part(part: PartFile) -> String {
     }
 }
 
-/// Keeps the files that killed runs left of `path`; returns the new names.
-fn keep_leftovers(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
-    // A folder may be writable without being readable.
-    let abandoned = atomic_file::find_abandoned(path).unwrap_or_default();
-    let kept = abandoned.into_iter().map(|part| keep_or_remove_part(&part, path));
-    kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
-}
-
-/// Renames an abandoned part to `path` with `.incomplete` in the name, and returns that name; removes an empty one.
-fn keep_or_remove_part(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
-    let done = match part.metadata().map(|part| part.len()) {
-        Ok(0) => fs::remove_file(part).map(|()| None),
-        Ok(_) => atomic_file::keep_incomplete(part, path).map(Some),
-        Err(error) => Err(error),
-    };
-    match done {
-        // Another process did the same at the same time.
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        done => done,
-    }
-}
-
 /// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete.mp4`; returns the new names.
 /// Ignores videos whose `NAME` does not satisfy `is_ours`, and those that cannot be renamed.
 pub fn recover_videos(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let abandoned = atomic_file::find_all_abandoned(folder).unwrap_or_default().into_iter();
     let ours = abandoned.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
-    ours.filter_map(|(part, name)| keep_or_remove_part(&part, &folder.join(name)).ok().flatten()).collect()
+    ours.filter_map(|(part, name)| atomic_file::keep_or_remove_part(&part, &folder.join(name)).ok().flatten()).collect()
 }

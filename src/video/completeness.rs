@@ -4,7 +4,6 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::VideoFile;
-use super::decoder::Conversion;
 use crate::files::input;
 
 /// What ffmpeg says when pictures or parts of them are lost. Its other errors may be harmless: `mmco: unref short failure`
@@ -32,8 +31,7 @@ pub(super) struct Expected {
 }
 
 impl Expected {
-    pub fn of(file: &VideoFile, conversion: &Conversion) -> Self {
-        let is_all = conversion.start_s == 0.0 && conversion.fps.is_none();
+    pub fn of(file: &VideoFile, is_all: bool) -> Self {
         Self { frames: file.frames.filter(|_| is_all), length_s: file.length_s, period_ns: file.period_ns }
     }
 

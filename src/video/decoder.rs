@@ -138,7 +138,7 @@ impl Decoder {
             frames: 0,
             last_ns: None,
             has_loss,
-            expected: Expected::of(file, conversion),
+            expected: Expected::of(file, conversion.start_s == 0.0 && conversion.fps.is_none()),
             remark: None,
         })
     }

@@ -11,24 +11,33 @@ mod tiff;
 mod unit;
 mod values;
 
+use std::fs::File;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, read_inside};
 pub use unit::DepthUnit;
 
-use super::RecordingError;
-use super::fault::PictureFault;
+use super::coded::{self, EncodedPicture};
+use super::decoders::guard;
+use super::fault::{PictureFault, open_fault};
+use super::unit::{KEYWORD, MapUnit};
+use super::{MAX_PIXELS, RecordingError, pfm};
+use crate::files::input;
 use crate::frame::{DepthMap, DisparityMap};
 use color_map::ColorMapped;
 use meaning::Meaning;
 use values::Values;
 
 /// File formats of depth maps, for messages.
-pub(super) const FORMATS: &str = "PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR";
+const FORMATS: &str = "PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR";
 
 /// Extensions of the files of depth maps. The first is that of snapshots.
 pub const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp"];
+
+/// Largest file of floats: 8 bytes per pixel, and room for a header.
+const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
 
 /// How to read a depth map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -103,7 +112,7 @@ pub(super) fn read_unfitted(path: &Path, options: &Options) -> Result<DepthFile,
 
 /// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth.
 fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
-    let colored = match values::read(path) {
+    let colored = match read_numbers(path) {
         Err(PictureFault::ColoredDepth) if matches!(options.unit, None | Some(DepthUnit::Inverse)) => {
             color_map::read(path)?
         }
@@ -120,6 +129,59 @@ fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
     }
 }
 
+/// Reads a map; the first bytes decide its format.
+fn read_numbers(path: &Path) -> Result<Values, PictureFault> {
+    let mut file = input::open(path).map_err(open_fault)?;
+    let mut start = [0; 8];
+    let mut length = 0;
+    while let read @ 1.. = file.read(&mut start[length..])? {
+        length += read;
+    }
+    file.rewind()?;
+    match &start[..length] {
+        [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => {
+            let mut values = Values::default();
+            (values.size, values.stated) = pfm::parse(&read_whole(file)?, &mut values.numbers)?;
+            Ok(values)
+        }
+        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => npy::parse(&read_whole(file)?),
+        [b'P', b'K', 3, 4, ..] => guard(|| npy::read_archive(file, MAX_FLOATS_BYTES)),
+        // 43 is BigTIFF.
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => guard(|| tiff::read(file)),
+        [0x76, 0x2f, 0x31, 0x01, ..] => guard(|| exr::read(file)),
+        [] => Err(PictureFault::Truncated),
+        _ => read_codes(path),
+    }
+}
+
+fn read_whole(file: File) -> Result<Vec<u8>, PictureFault> {
+    let bytes = file.metadata()?.len();
+    if bytes > MAX_FLOATS_BYTES {
+        return Err(PictureFault::FileSize { bytes, max_bytes: MAX_FLOATS_BYTES });
+    }
+    let mut content = Vec::with_capacity(bytes as usize);
+    file.take(MAX_FLOATS_BYTES).read_to_end(&mut content)?;
+    Ok(content)
+}
+
+/// Reads the codes of a picture, upright by its orientation tag.
+fn read_codes(path: &Path) -> Result<Values, PictureFault> {
+    let mut memory = Vec::new();
+    let coded = EncodedPicture::open(path, &mut memory).map_err(|fault| match fault {
+        PictureFault::Format(_) => PictureFault::Format(FORMATS),
+        fault => fault,
+    })?;
+    let (values, mut metadata) = values::decode_codes(coded)?;
+    Ok(Values { stated: read_stated_unit(path), ..values }.turned(metadata.take_orientation()))
+}
+
+/// Reads the unit that a PNG of ours states.
+fn read_stated_unit(path: &Path) -> Option<MapUnit> {
+    let info = coded::read_png_info(path).ok()?;
+    let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD)?;
+    MapUnit::from_text(&chunk.text)
+}
+
 /// Reads the range of the numbers of relative depth, for [`Options::range`]; `None` if the map has metres.
 pub(super) fn read_range(path: &Path, options: &Options) -> Result<Option<(f32, f32)>, PictureFault> {
     let values = read_values(path, options)?;
@@ -128,7 +190,7 @@ pub(super) fn read_range(path: &Path, options: &Options) -> Result<Option<(f32, 
 
 /// Reads a map of disparities in pixels, 0 = unknown: whole numbers of 16 bits are 1/256 px.
 pub(super) fn read_disparity(path: &Path) -> Result<DisparityMap, PictureFault> {
-    let values = values::read(path)?;
+    let values = read_numbers(path)?;
     let per_px = values.disparities_per_px();
     let px = |value: f32| if DepthMap::is_known(value) { value / per_px } else { 0.0 };
     let (width, height) = values.size;

@@ -1,18 +1,9 @@
 //! The numbers of a map as stored, whatever the format.
 
-use std::fs::File;
-use std::io::{Read, Seek};
-use std::path::Path;
-
 use image::metadata::Orientation;
 
-use super::{FORMATS, exr, npy, tiff};
-use crate::files::input;
-use crate::recording::MAX_PIXELS;
-use crate::recording::coded::{self, EncodedPicture};
-use crate::recording::decoders::guard;
-use crate::recording::fault::{PictureFault, open_fault};
-use crate::recording::pfm;
+use crate::recording::coded::EncodedPicture;
+use crate::recording::fault::PictureFault;
 use crate::recording::photo_metadata::PhotoMetadata;
 use crate::recording::unit::{self, MapUnit};
 use crate::recording::upright::upright;
@@ -62,55 +53,16 @@ impl Values {
     pub fn disparities_per_px(&self) -> f32 {
         if self.samples == Samples::Sixteen { unit::DISPARITY_SCALE } else { 1.0 }
     }
-}
 
-/// Largest file of floats: 8 bytes per pixel, and room for a header.
-const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
-
-/// Reads a map; the first bytes decide its format.
-pub(super) fn read(path: &Path) -> Result<Values, PictureFault> {
-    let mut file = input::open(path).map_err(open_fault)?;
-    let mut start = [0; 8];
-    let mut length = 0;
-    while let read @ 1.. = file.read(&mut start[length..])? {
-        length += read;
-    }
-    file.rewind()?;
-    match &start[..length] {
-        [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => {
-            let mut values = Values::default();
-            (values.size, values.stated) = pfm::parse(&read_whole(file)?, &mut values.numbers)?;
-            Ok(values)
+    /// Returns the map turned as an orientation tag says.
+    pub fn turned(self, orientation: Orientation) -> Self {
+        let transform = upright(orientation);
+        if transform.is_identity() {
+            return self;
         }
-        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => npy::parse(&read_whole(file)?),
-        [b'P', b'K', 3, 4, ..] => guard(|| npy::read_archive(file, MAX_FLOATS_BYTES)),
-        // 43 is BigTIFF.
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => guard(|| tiff::read(file)),
-        [0x76, 0x2f, 0x31, 0x01, ..] => guard(|| exr::read(file)),
-        [] => Err(PictureFault::Truncated),
-        _ => read_codes(path),
+        let numbers = transform.apply_to_pixels(&self.numbers, self.size);
+        Self { size: transform.rotated_size(self.size), numbers, ..self }
     }
-}
-
-fn read_whole(file: File) -> Result<Vec<u8>, PictureFault> {
-    let bytes = file.metadata()?.len();
-    if bytes > MAX_FLOATS_BYTES {
-        return Err(PictureFault::FileSize { bytes, max_bytes: MAX_FLOATS_BYTES });
-    }
-    let mut content = Vec::with_capacity(bytes as usize);
-    file.take(MAX_FLOATS_BYTES).read_to_end(&mut content)?;
-    Ok(content)
-}
-
-/// Reads the codes of a picture, upright by its orientation tag.
-fn read_codes(path: &Path) -> Result<Values, PictureFault> {
-    let mut memory = Vec::new();
-    let coded = EncodedPicture::open(path, &mut memory).map_err(|fault| match fault {
-        PictureFault::Format(_) => PictureFault::Format(FORMATS),
-        fault => fault,
-    })?;
-    let (values, mut metadata) = decode_codes(coded)?;
-    Ok(Values { stated: read_stated_unit(path), ..values }.turned(metadata.take_orientation()))
 }
 
 /// Decodes the codes of a picture as stored.
@@ -141,13 +93,6 @@ pub(super) fn decode_codes(coded: EncodedPicture) -> Result<(Values, PhotoMetada
     Ok((Values { size: (width, height), numbers, samples, ..Values::default() }, metadata))
 }
 
-/// Reads the unit that a PNG of ours states.
-fn read_stated_unit(path: &Path) -> Option<MapUnit> {
-    let info = coded::read_png_info(path).ok()?;
-    let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == unit::KEYWORD)?;
-    MapUnit::from_text(&chunk.text)
-}
-
 /// Counts the pixels of an RGB picture that are not grey.
 pub(super) struct ColorCount {
     tolerance: f32,
@@ -175,17 +120,5 @@ impl ColorCount {
     pub fn check(&self, pixels: usize) -> Result<(), PictureFault> {
         let is_colored = self.count as f32 > Self::MAX_SHARE * pixels as f32;
         if is_colored { Err(PictureFault::ColoredDepth) } else { Ok(()) }
-    }
-}
-
-impl Values {
-    /// Returns the map turned as an orientation tag says.
-    pub fn turned(self, orientation: Orientation) -> Self {
-        let transform = upright(orientation);
-        if transform.is_identity() {
-            return self;
-        }
-        let numbers = transform.apply_to_pixels(&self.numbers, self.size);
-        Self { size: transform.rotated_size(self.size), numbers, ..self }
     }
 }

@@ -1,6 +1,6 @@
 //! Writes a recording as an MCAP file of ROS 2.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufWriter, ErrorKind};
 use std::path::{Path, PathBuf};
 
@@ -65,14 +65,7 @@ impl Writer {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordingError::Exists { path: path.to_owned() });
         }
-        for part in atomic_file::find_abandoned(path).unwrap_or_default() {
-            if part.metadata().is_ok_and(|part| part.len() == 0) {
-                // Killed before its first frame; another process may do the same.
-                let _ = fs::remove_file(&part);
-            } else if let Ok(kept) = atomic_file::keep_incomplete(&part, path) {
-                tracing::warn!("{}: what a killed run had written is kept as {}", path.display(), kept.display());
-            }
-        }
+        atomic_file::keep_leftovers(path).map_err(RecordingError::io("write", path))?;
         let part = PartFile::create(path).map_err(RecordingError::io("create", path))?;
         let stream = part.file().try_clone().map_err(RecordingError::io("create", path))?;
         let begun = FileWriter::begin(BufWriter::new(stream), "ros2", LIBRARY);

@@ -140,7 +140,7 @@ pub struct Stream {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
-    /// Overwrite existing outputs, once the new ones are complete; in a folder, only files written by bokehcam
+    /// Overwrite existing outputs, once the new ones are complete; a folder only if bokehcam wrote all its files
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub force: bool,
