@@ -114,7 +114,7 @@ fn only_a_recording_of_our_own_is_replaced() {
     let ran = home.run(&["record", "source", "--to", "old"]);
     assert!(ran.code == 1 && ran.stderr.contains("--force"), "{}", ran.stderr);
 
-    // A file of somebody else, and one with the name of a picture.
+    // A foreign file, and one with the name of a picture.
     for foreign in ["old/groundtruth.txt", "old/rgb/000003.png"] {
         fs::write(at(foreign), "mine").unwrap();
         let before = all(home.0.path());
