@@ -312,7 +312,7 @@ pub fn is_part_name(name: &OsStr) -> bool {
 }
 
 /// Returns the final name of a part file; `None` if the name does not have the form of [`create_part_name`].
-fn parse_part_name(part: &OsStr) -> Option<&OsStr> {
+pub(super) fn parse_part_name(part: &OsStr) -> Option<&OsStr> {
     let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;
     let (name, numbers) = part.split_at(part.iter().rposition(|&byte| byte == b'.')?);
     let mut numbers = numbers[1..].split(|&byte| byte == b'-');

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use rustix::fs::syncfs;
 
-use super::atomic_file::{PartFile, is_part_name, sync_folder};
+use super::atomic_file::{PartFile, parse_part_name, sync_folder};
 use super::{input, lock};
 
 /// The name of the list of our own files.
@@ -88,7 +88,7 @@ impl Folder {
             if !replace {
                 return Err(FolderError::NotEmpty { path });
             }
-            count_own_files(&path)?;
+            own_files(&path)?;
             target = create_beside(&path, "incomplete")?;
             lock = lock_folder(&target)?;
         }
@@ -169,7 +169,7 @@ impl Folder {
     /// Moves the old folder away, the new one to its place, and then removes the old one.
     fn replace_old(&self) -> Result<u64, FolderError> {
         let write = || FolderError::cannot_write(&self.path);
-        let count = count_own_files(&self.path)?;
+        let own = own_files(&self.path)?;
         let permissions = fs::metadata(&self.path).map_err(write())?.permissions();
         fs::set_permissions(&self.target, permissions).map_err(write())?;
         let old = create_beside(&self.path, "replaced")?;
@@ -185,8 +185,8 @@ impl Folder {
             return Err(write()(cause));
         }
         sync_folder(&self.path).map_err(write())?;
-        fs::remove_dir_all(&old).map_err(FolderError::cannot_write(&old))?;
-        Ok(count)
+        remove_own(&old, &own)?;
+        Ok(own.count)
     }
 
     /// Syncs all files at once: a sync after each would take longer than a camera can wait.
@@ -236,30 +236,66 @@ pub fn list_file(folder: &Path, name: &str) -> Result<(), FolderError> {
     list.and_then(|mut list| list.write_all(format!("\n{name}").as_bytes())).map_err(FolderError::cannot_write(&path))
 }
 
-/// Returns the number of files in a folder and its subfolders. Fails at a file that is not on its list.
-fn count_own_files(path: &Path) -> Result<u64, FolderError> {
+/// What a folder of ours has: paths within it.
+#[derive(Default)]
+struct OwnFiles {
+    /// Listed files, the list itself, and parts of such files.
+    files: Vec<PathBuf>,
+    /// The folder itself, and its subfolders, each after the one that it is in.
+    folders: Vec<PathBuf>,
+    /// Number of listed files.
+    count: u64,
+}
+
+/// Finds the files in a folder and its subfolders. Fails at a file that is not on its list.
+fn own_files(path: &Path) -> Result<OwnFiles, FolderError> {
     let list = path.join(LIST_NAME);
     let names = match input::read_text(&list, input::MAX_TEXT_BYTES) {
         Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
         names => names.map_err(FolderError::cannot_write(&list))?,
     };
     let names: HashSet<&str> = names.lines().collect();
-    let (mut count, mut folders) = (0, vec![path.to_owned()]);
-    while let Some(folder) = folders.pop() {
+    let mut own = OwnFiles { folders: vec![PathBuf::new()], ..OwnFiles::default() };
+    let mut next = 0;
+    while let Some(folder) = own.folders.get(next).map(|folder| path.join(folder)) {
+        next += 1;
         for entry in fs::read_dir(&folder).map_err(FolderError::cannot_write(&folder))? {
             let (file, is_folder) = entry
                 .and_then(|entry| Ok((entry.path(), entry.file_type()?.is_dir())))
                 .map_err(FolderError::cannot_write(&folder))?;
-            let name = file.strip_prefix(path).ok().and_then(Path::to_str);
-            match is_folder {
-                true => folders.push(file),
-                false if name.is_some_and(|name| names.contains(name)) => count += 1,
-                false if file == list || file.file_name().is_some_and(is_part_name) => {}
-                false => return Err(FolderError::Foreign { path: file }),
+            let name = file.strip_prefix(path).unwrap_or(&file).to_owned();
+            if is_folder {
+                own.folders.push(name);
+                continue;
             }
+            let is_listed = name.to_str().is_some_and(|name| names.contains(name));
+            // A video's part is no leftover of a set of pictures.
+            let is_leftover = || {
+                let of = file.file_name().and_then(parse_part_name).and_then(|of| Path::new(of).extension());
+                of.is_some_and(|of| names.iter().any(|name| Path::new(name).extension() == Some(of)))
+            };
+            if !is_listed && file != list && !is_leftover() {
+                return Err(FolderError::Foreign { path: file });
+            }
+            own.count += u64::from(is_listed);
+            own.files.push(name);
         }
     }
-    Ok(count)
+    Ok(own)
+}
+
+/// Removes the files of `own` from a folder, and the folder if nothing else has appeared in it.
+fn remove_own(path: &Path, own: &OwnFiles) -> Result<(), FolderError> {
+    own.files.iter().try_for_each(|file| remove(fs::remove_file, &path.join(file)))?;
+    own.folders.iter().rev().try_for_each(|folder| remove(fs::remove_dir, &path.join(folder)))
+}
+
+/// Removes a file or an empty folder. One that is gone, or a folder with something in it, is no error.
+fn remove(remove: fn(&Path) -> io::Result<()>, path: &Path) -> Result<(), FolderError> {
+    match remove(path) {
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => Ok(()),
+        done => done.map_err(FolderError::cannot_write(path)),
+    }
 }
 
 fn lock_folder(path: &Path) -> Result<File, FolderError> {

@@ -89,7 +89,7 @@ fn foreign_files_are_refused_and_never_touched() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out");
     write(&path, &[("0.png", "old")]);
-    for name in ["1.png", "rgb/5.png", "notes.txt", "a/b/c/notes.txt", ".hidden"] {
+    for name in ["1.png", ".take.mp4.77-0.part", "rgb/5.png", "notes.txt", "a/b/c/notes.txt", ".hidden"] {
         fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
         fs::write(path.join(name), "mine").unwrap();
         let error = open(&path).unwrap_err().to_string();
@@ -105,6 +105,11 @@ fn foreign_files_are_refused_and_never_touched() {
     assert_eq!(all(&path), ["0.png=old", "1.png=mine"]);
     assert_eq!(all(&dir.path().join("out.incomplete")), ["1.png=new"]);
     fs::remove_file(path.join("1.png")).unwrap();
+    let old = own_files(&path).unwrap();
+    fs::write(path.join("2.png"), "mine").unwrap();
+    remove_own(&path, &old).unwrap();
+    assert_eq!(all(&path), ["2.png=mine"], "what appears last of all stays, too");
+    fs::remove_file(path.join("2.png")).unwrap();
 
     // A folder without a list, such as that of another program, and a list that names files elsewhere.
     let other = dir.path().join("other");
@@ -112,7 +117,6 @@ fn foreign_files_are_refused_and_never_touched() {
     fs::write(other.join("3.png"), "mine").unwrap();
     assert!(matches!(open(&other), Err(FolderError::Foreign { .. })));
     fs::write(path.join(LIST_NAME), "0.png\n../other/3.png\nrgb\n").unwrap();
-    fs::remove_dir(path.join("rgb")).unwrap();
     symlink(&other, path.join("rgb")).unwrap();
     write(&path, &[("2.png", "new")]);
     assert_eq!((all(&path), all(&other)), (vec!["2.png=new".to_owned()], vec!["3.png=mine".to_owned()]));
