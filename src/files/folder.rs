@@ -286,15 +286,15 @@ fn own_files(path: &Path) -> Result<OwnFiles, FolderError> {
 
 /// Removes the files of `own` from a folder, and the folder if nothing else has appeared in it.
 fn remove_own(path: &Path, own: &OwnFiles) -> Result<(), FolderError> {
-    own.files.iter().try_for_each(|file| remove(fs::remove_file, &path.join(file)))?;
-    own.folders.iter().rev().try_for_each(|folder| remove(fs::remove_dir, &path.join(folder)))
+    own.files.iter().try_for_each(|file| remove(fs::remove_file, path.join(file)))?;
+    own.folders.iter().rev().try_for_each(|folder| remove(fs::remove_dir, path.join(folder)))
 }
 
 /// Removes a file or an empty folder. One that is gone, or a folder with something in it, is no error.
-fn remove(remove: fn(&Path) -> io::Result<()>, path: &Path) -> Result<(), FolderError> {
-    match remove(path) {
+fn remove(remove: fn(PathBuf) -> io::Result<()>, path: PathBuf) -> Result<(), FolderError> {
+    match remove(path.clone()) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => Ok(()),
-        done => done.map_err(FolderError::cannot_write(path)),
+        done => done.map_err(FolderError::cannot_write(&path)),
     }
 }
 
