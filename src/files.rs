@@ -9,5 +9,4 @@ pub mod lock;
 pub mod pipe_reader;
 pub mod place;
 pub mod process;
-pub mod trusted;
 pub mod user_folders;

@@ -39,7 +39,7 @@
 //! of a monotonic clock; blurring happens in linear light.
 //!
 //! `unsafe` is allowed in `compute/thread_pool.rs` and its `wavefront`, for a prefetch in `compute/simd.rs`, for
-//! shaders without loop bounding in `compute/device.rs`, in `pipewire/buffer.rs`, `pipewire/log.rs`,
+//! shaders without loop bounding in `compute/device.rs`, for the allocator in `compute/memory_limit.rs`, in `pipewire/buffer.rs`, `pipewire/log.rs`,
 //! `pipewire/session.rs`, under `v4l2`, and in the crate `bokehcam-link`, where each block has its safety argument.
 //! `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
 

@@ -5,6 +5,7 @@ pub mod bands;
 #[cfg(feature = "gpu")]
 pub mod device;
 pub mod memory;
+pub mod memory_limit;
 pub mod pass_times;
 pub mod simd;
 pub mod thread_pool;
@@ -115,13 +116,18 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
     done.map_err(std::mem::forget).ok()
 }
 
+/// Declares that whoever runs work on this thread reports its panics, as [`catch_panic`] does.
+pub fn expect_panics() {
+    IS_CATCHING.set(true);
+}
+
 /// Returns the message of a panic from its payload.
 pub fn panic_message(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<&str>().copied();
     text.or(payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }
 
-/// Whether a panic of this thread is inside [`catch_panic`], whose caller reports it: no crash to log.
+/// Whether a panic of this thread is one that a caller reports: no crash to log.
 pub fn is_catching_panics() -> bool {
     IS_CATCHING.get()
 }

@@ -10,8 +10,8 @@ use std::time::Duration;
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
+use crate::files::data::absolute_env_path;
 use crate::files::lock::lock_folder;
-use crate::files::trusted::absolute_env_path;
 
 /// Time limit for the folder's lock, which runs hold briefly while they start.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(1);

@@ -3,7 +3,11 @@
 use std::env;
 use std::path::PathBuf;
 
-use super::trusted::absolute_env_path;
+/// Returns the path in an environment variable; `None` if it is empty or relative, because a relative path would depend
+/// on the working directory.
+pub fn absolute_env_path(variable: &str) -> Option<PathBuf> {
+    env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute())
+}
 
 /// Returns the user's folder: `$XDG_DATA_HOME`, or `~/.local/share`.
 pub fn user_data_dir() -> Option<PathBuf> {

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 
-use super::data::user_dir;
+use super::data::{absolute_env_path, user_dir};
 use super::input;
-use super::trusted::absolute_env_path;
 
 /// The default folders of snapshots and recordings.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,14 +1,16 @@
-//! The built-in ONNX runtime (`rten`), in pure Rust.
+//! Runs ONNX networks by `rten`, a runtime in pure Rust.
 
 use std::sync::Arc;
 
-use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView};
+use rten::{Dimension, Model, ModelOptions, NodeId, RunOptions, ThreadPool, Value, ValueOrView};
 use rten_tensor::TensorView;
 use rten_tensor::prelude::*;
 
 use super::{Engine, Network, Port, Tensor, onnx, to_one_line};
+use crate::compute::expect_panics;
+use crate::compute::memory_limit::MemoryLimit;
 
-/// A network run by the built-in runtime.
+/// A network run by `rten`.
 pub struct BuiltIn {
     model: Model,
     /// A pool of one thread; the other cores are for the blur.
@@ -16,12 +18,19 @@ pub struct BuiltIn {
 }
 
 impl BuiltIn {
-    pub fn load(bytes: Vec<u8>) -> Result<Network, String> {
-        let model = Model::load(onnx::remove_output_shapes(bytes)?).map_err(to_one_line)?;
+    /// Loads a network, whose thread gets the memory limit of this one. Optimisation computes constants, in other threads.
+    pub fn load(bytes: Vec<u8>, optimized: bool) -> Result<Network, String> {
+        let bytes = onnx::remove_output_shapes(bytes)?;
+        let model = ModelOptions::with_all_ops().enable_optimization(optimized).load(bytes).map_err(to_one_line)?;
         let ports = |ids: &[NodeId]| ids.iter().map(|&id| read_port(&model, id)).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(model.input_ids())?, ports(model.output_ids())?);
-        let engine = Box::new(Self { model, threads: Arc::new(ThreadPool::with_num_threads(1)) });
-        Ok(Network { engine, inputs, outputs, runtime: "the built-in runtime".to_owned() })
+        let threads = Arc::new(ThreadPool::with_num_threads(1));
+        let limit = MemoryLimit::of_thread();
+        threads.run(|| {
+            limit.map(MemoryLimit::apply);
+            expect_panics();
+        });
+        Ok(Network { engine: Box::new(Self { model, threads }), inputs, outputs, runtime: "rten" })
     }
 }
 

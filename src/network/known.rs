@@ -144,7 +144,7 @@ impl KnownNetwork {
     }
 
     /// Returns whether a known network has this size: files of other sizes need not be read.
-    pub(super) fn is_known_size(bytes: u64) -> bool {
+    pub fn is_known_size(bytes: u64) -> bool {
         KNOWN_NETWORKS.iter().any(|known| known.bytes == bytes)
     }
 

@@ -1,49 +1,32 @@
 //! Loads and runs neural networks from TFLite and ONNX files, without trusting the files.
 //!
 //! The fastest person segmentation, which comes with the packages, is a TFLite file, run by our own code (`tflite`).
-//! ONNX files are run by ONNX Runtime if installed, or else by a library. Files are not trusted: their size and that of
-//! all inputs and outputs is limited, loops are rejected, and failures become one-line errors. No runtime limits memory
-//! and time of a network, so a program may run unknown networks in a separate process ([`isolation`]).
+//! ONNX files are run by a library, `rten`. Files are not trusted: their size and that of all inputs and outputs is
+//! limited, loops are rejected, and failures become one-line errors. Memory and work of a TFLite file are known before it
+//! runs; an unknown ONNX file runs in a thread with limits (`bounded`).
 
+mod bounded;
 mod built_in;
-mod installed;
-pub mod isolation;
 mod known;
 mod onnx;
-mod onnx_runtime;
 mod tflite;
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-pub use installed::{find_best, find_best_in, installed_networks, model_folders};
+pub use bounded::shorten_timeouts;
 pub use known::{KNOWN_NETWORKS, KnownNetwork, Scaling, Task};
-pub use onnx_runtime::installed_version as onnx_runtime_version;
 
 use crate::compute::catch_panic;
-use crate::files::input;
-use crate::names::named;
 
 /// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
 pub const MAX_BYTES: u64 = 200 << 20;
 /// Maximum number of values of an input or output: more than any picture that a network receives.
 pub const MAX_VALUES: usize = 4 << 20;
 
-named! {
-    /// What runs networks.
-    pub enum Runtime default Auto {
-        /// ONNX Runtime where it is installed, else the built-in runtime
-        Auto = "auto",
-        /// The built-in one: slower, but nothing to install
-        BuiltIn = "built-in",
-        /// ONNX Runtime, from ORT_DYLIB_PATH or its usual place
-        OnnxRuntime = "onnx-runtime",
-    }
-}
-
 /// An input or output of a network.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
     /// Its name in the file.
     pub name: String,
@@ -88,8 +71,8 @@ pub struct Network {
     pub inputs: Vec<Port>,
     /// Its outputs.
     pub outputs: Vec<Port>,
-    /// The runtime, such as `ONNX Runtime 1.21.0`.
-    pub runtime: String,
+    /// The runtime, such as `rten`.
+    pub runtime: &'static str,
 }
 
 impl Network {
@@ -125,9 +108,6 @@ pub enum NetworkError {
         /// The reason.
         why: String,
     },
-    /// ONNX Runtime is not available.
-    #[error("ONNX Runtime: {0}")]
-    NoRuntime(String),
 }
 
 /// A loaded network, and what is known about its file.
@@ -141,23 +121,12 @@ pub struct LoadedNetwork {
 /// Loads the network in the file `path`.
 ///
 /// # Errors
-/// The file is unreadable, not a network, has loops or operators that the runtime does not support, or the requested
-/// runtime is not available.
-pub fn load(path: &Path, runtime: Runtime) -> Result<LoadedNetwork, NetworkError> {
-    let bytes = input::read(path, MAX_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
+/// The file is unreadable, not a network, or has loops or operators that its runtime does not support.
+pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkError> {
+    let bytes = read(path).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = KnownNetwork::identify(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
-    if !tflite::is_tflite(&bytes) {
-        onnx::reject_loops(&bytes).map_err(refused)?;
-    }
-    let loaded = match isolation::is_enabled() && known.is_none() {
-        true => isolation::load(&bytes, runtime),
-        false => load_in_process(bytes, runtime),
-    };
-    let network = loaded.map_err(|failure| match failure {
-        LoadFailure::NoRuntime(why) => NetworkError::NoRuntime(why),
-        LoadFailure::Refused(why) => refused(why),
-    })?;
+    let network = load_bytes(bytes, known.is_some()).map_err(refused)?;
     for port in network.inputs.iter().chain(&network.outputs) {
         if port
             .shape
@@ -171,40 +140,34 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<LoadedNetwork, NetworkError
     Ok(LoadedNetwork { network, known })
 }
 
-/// An error of a runtime in loading a network.
-#[derive(Debug, Serialize, Deserialize)]
-enum LoadFailure {
-    /// The runtime is not available.
-    NoRuntime(String),
-    /// The network is rejected.
-    Refused(String),
+/// Reads a regular file of at most [`MAX_BYTES`]: opening a pipe would block.
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !path.metadata()?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MAX_BYTES {
+        true => Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it has more than {MAX_BYTES} bytes"))),
+        false => Ok(bytes),
+    }
 }
 
-/// Loads a network in this process.
-fn load_in_process(bytes: Vec<u8>, runtime: Runtime) -> Result<Network, LoadFailure> {
+/// Loads a network by the runtime for its format.
+fn load_bytes(bytes: Vec<u8>, is_known: bool) -> Result<Network, String> {
     if tflite::is_tflite(&bytes) {
-        return match runtime {
-            Runtime::OnnxRuntime => Err(LoadFailure::Refused(
-                "a .tflite runs on the built-in runtime: leave --network-runtime out".to_owned(),
-            )),
-            _ => run_guarded(|| tflite::Tflite::load(&bytes)).map_err(LoadFailure::Refused),
-        };
+        return run_guarded(|| tflite::Tflite::load(&bytes));
     }
-    let other = match runtime {
-        Runtime::BuiltIn => None,
-        Runtime::Auto => onnx_runtime::environment().ok(),
-        Runtime::OnnxRuntime => Some(onnx_runtime::environment().map_err(LoadFailure::NoRuntime)?),
-    };
-    run_guarded(|| match other {
-        Some(environment) => onnx_runtime::OnnxRuntime::load(&environment, &bytes),
-        None => built_in::BuiltIn::load(bytes),
-    })
-    .map_err(LoadFailure::Refused)
+    onnx::check(&bytes)?;
+    if is_known { run_guarded(|| built_in::BuiltIn::load(bytes, true)) } else { bounded::load(bytes) }
 }
+
+/// The error of a runtime that panics.
+const PANICKED: &str = "its runtime panicked";
 
 /// Calls a runtime; turns panics into errors.
 fn run_guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_panic(work).unwrap_or_else(|| Err("its runtime panicked".to_owned()))
+    catch_panic(work).unwrap_or_else(|| Err(PANICKED.to_owned()))
 }
 
 /// Returns a runtime's message as one line of at most 300 characters.

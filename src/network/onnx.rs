@@ -1,5 +1,5 @@
-//! Checks and rewrites ONNX files before a runtime reads them: rejects loops, and removes the attribute `output_shape`
-//! of transposed convolutions, which the built-in runtime does not support.
+//! Checks and rewrites ONNX files before `rten` reads them: rejects loops and what it would recurse into too deeply, and
+//! removes the attribute `output_shape` of transposed convolutions, which it does not support.
 //!
 //! Converters write that attribute in addition to strides that imply it. Only the attribute is removed; if the sizes do
 //! not fit without it, the network fails when it runs.
@@ -13,17 +13,22 @@ const OUTPUT_SHAPE: &[u8] = b"output_shape";
 /// Operators that repeat a part of the network as often as its data says, possibly forever. Networks for pictures do
 /// not need them.
 const LOOP_OPERATORS: [&[u8]; 3] = [b"Loop", b"Scan", b"SequenceMap"];
-/// Maximum nesting of branches: networks have one or two levels, and each is a recursive call in a runtime.
+/// Maximum nesting of branches and types: networks have one or two levels, and each is a recursive call in `rten`.
 const MAX_DEPTH: usize = 8;
+/// Maximum number of operators, each of which may be a recursive call in `rten`; networks have some thousands.
+const MAX_NODES: usize = 20_000;
 
-/// Messages that may contain nodes, with the fields that lead to them (onnx.proto).
-#[derive(Clone, Copy)]
+/// Messages that may contain nodes or types, with the fields that lead to them (onnx.proto).
+#[derive(Clone, Copy, PartialEq)]
 enum MessageType {
     Model,
     Function,
     Graph,
     Node,
     Attribute,
+    Value,
+    Type,
+    Sequence,
 }
 
 impl MessageType {
@@ -33,22 +38,30 @@ impl MessageType {
             (MessageType::Model, 25) => Some(MessageType::Function),
             (MessageType::Function, 7) | (MessageType::Graph, 1) => Some(MessageType::Node),
             (MessageType::Node, 5) => Some(MessageType::Attribute),
+            (MessageType::Graph, 11..=13) => Some(MessageType::Value),
+            (MessageType::Value, 2) | (MessageType::Sequence, 1) => Some(MessageType::Type),
+            (MessageType::Type, 4) => Some(MessageType::Sequence),
             _ => None,
         }
     }
 }
 
-/// Rejects operators that may run forever, also in branches and in the model's own functions.
+/// Rejects operators that may run forever, also in branches and in the model's own functions, and models that are nested
+/// too deeply or have too many operators.
 ///
 /// # Errors
-/// There is such an operator, branches are nested too deeply, or the file is not ONNX.
-pub fn reject_loops(model: &[u8]) -> Result<(), String> {
-    reject_loops_in(MessageType::Model, model, 0)
+/// The model is rejected, or the file is not ONNX.
+pub fn check(model: &[u8]) -> Result<(), String> {
+    check_message(MessageType::Model, model, 0, &mut 0)
 }
 
-fn reject_loops_in(message_type: MessageType, message: &[u8], depth: usize) -> Result<(), String> {
+fn check_message(message_type: MessageType, message: &[u8], depth: usize, nodes: &mut usize) -> Result<(), String> {
+    *nodes += usize::from(message_type == MessageType::Node);
     if depth > MAX_DEPTH {
         return Err(format!("it has branches within branches, {MAX_DEPTH} deep or more"));
+    }
+    if *nodes > MAX_NODES {
+        return Err(format!("it has more than {MAX_NODES} operators"));
     }
     let mut rest = message;
     while !rest.is_empty() {
@@ -61,7 +74,8 @@ fn reject_loops_in(message_type: MessageType, message: &[u8], depth: usize) -> R
             return Err(format!("it has the operator {name}, which may run forever; export it without loops"));
         }
         if let Some(inner) = message_type.child(tag >> 3) {
-            reject_loops_in(inner, content, depth + usize::from(matches!(message_type, MessageType::Attribute)))?;
+            let is_nesting = matches!(message_type, MessageType::Attribute | MessageType::Sequence);
+            check_message(inner, content, depth + usize::from(is_nesting), nodes)?;
         }
     }
     Ok(())
@@ -192,14 +206,19 @@ mod tests {
             let function = with(25, &with(7, &with(4, name)));
             let models = [with(7, &within), with(7, &branch(&within)), [with(7, &branch(&[])), function].concat()];
             for model in models {
-                assert!(reject_loops(&model).unwrap_err().contains("may run forever"), "{model:?}");
+                assert!(check(&model).unwrap_err().contains("may run forever"), "{model:?}");
             }
         }
         // A node's name is not its operator.
-        reject_loops(&with(7, &with(1, &[with(4, b"Conv"), with(3, b"Loop")].concat()))).unwrap();
+        check(&with(7, &with(1, &[with(4, b"Conv"), with(3, b"Loop")].concat()))).unwrap();
         let nested = |count: usize| (0..count).fold(Vec::new(), |inner, _| branch(&inner));
-        reject_loops(&with(7, &nested(MAX_DEPTH))).unwrap();
-        reject_loops(&with(7, &nested(50))).unwrap_err();
+        check(&with(7, &nested(MAX_DEPTH))).unwrap();
+        check(&with(7, &nested(50))).unwrap_err();
+        let types = (0..50).fold(Vec::new(), |inner, _| with(4, &with(1, &inner)));
+        check(&with(7, &with(11, &with(2, &types)))).unwrap_err();
+        let many = |count| with(7, &with(1, &[]).repeat(count));
+        check(&many(MAX_NODES)).unwrap();
+        assert!(check(&many(MAX_NODES + 1)).unwrap_err().contains("operators"));
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::fault::png_fault;
 use super::still::{PhotoFormat, photo_format, write_color, write_depth};
-use crate::files::trusted::absolute_env_path;
+use crate::files::data::absolute_env_path;
 use crate::files::{atomic_file, user_folders};
 use crate::frame::{ColorImage, DepthMap};
 

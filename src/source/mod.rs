@@ -18,6 +18,8 @@ mod containers;
 pub mod devices;
 mod error;
 mod external_depth;
+#[cfg(feature = "networks")]
+pub mod installed;
 pub mod modes;
 mod name;
 mod networks;

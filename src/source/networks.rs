@@ -19,8 +19,9 @@ type Opened = (Box<dyn Companion>, String);
 /// A network is not installed or cannot be used.
 #[cfg(feature = "networks")]
 pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -> Result<Opened, SourceError> {
+    use super::installed::find_best;
     use crate::depth::single_camera::{Hints, SingleCamera};
-    use crate::network::{Task, find_best};
+    use crate::network::Task;
     let file = |chosen: &Option<NetworkFile>, task: Task| {
         match chosen {
         None => Ok(None),
@@ -40,8 +41,7 @@ pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -
         scaling: options.network_range.map(super::options::Range::scaling),
         bgr: options.network_order.map(|order| order == super::options::Order::Bgr),
     };
-    let runtime = options.network_runtime.unwrap_or_default();
-    let networks = SingleCamera::open(matte.as_deref(), mono.as_deref(), &hints, runtime)?;
+    let networks = SingleCamera::open(matte.as_deref(), mono.as_deref(), &hints)?;
     let about = networks.describe();
     Ok((Box::new(networks), about))
 }
@@ -49,8 +49,8 @@ pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -
 /// Returns the best installed networks, if any.
 #[cfg(feature = "networks")]
 pub fn installed_networks() -> SingleCameraDepth {
-    use crate::network::{self, Task};
-    let installed = network::installed_networks();
+    use crate::network::Task;
+    let installed = super::installed::installed_networks();
     let best =
         |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
     SingleCameraDepth { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }

@@ -23,7 +23,7 @@ const LAYERS: [&[&str]; 13] = [
 ];
 
 /// External crates, and the only places that may name them: modules of the library, or folders of a crate above it.
-const DOORS: [(&str, &[&str]); 37] = [
+const DOORS: [(&str, &[&str]); 36] = [
     ("bokehcam_link", &["lib"]),
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
@@ -40,7 +40,6 @@ const DOORS: [(&str, &[&str]); 37] = [
     ("lz4_flex", &["recording/mcap"]),
     ("lzfse_rust", &["recording/record3d"]),
     ("moxcms", &["recording/icc"]),
-    ("ort", &["network/onnx_runtime"]),
     ("pipewire", &["pipewire"]),
     ("plotters", &["lab"]),
     ("png", &["recording", "sink"]),
@@ -53,7 +52,6 @@ const DOORS: [(&str, &[&str]); 37] = [
             "control",
             "files",
             "link/event",
-            "network/isolation",
             "pipewire",
             "sink/pipe",
             "v4l2",

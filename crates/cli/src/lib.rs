@@ -9,8 +9,6 @@ mod files;
 mod focus;
 mod help;
 mod log;
-#[cfg(feature = "networks")]
-mod networks_apart;
 mod options;
 mod parse;
 #[doc(hidden)]
@@ -32,11 +30,6 @@ use settings::{arguments, environment};
 
 /// Runs the program. An error becomes one line on stderr and an exit code: 1 for failures, 2 for wrong arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<OsString> = args.into_iter().collect();
-    #[cfg(feature = "networks")]
-    if networks_apart::is_worker_call(&args) {
-        return networks_apart::serve();
-    }
     let args = arguments::join_negative_numbers(args);
     #[cfg(feature = "lab")]
     bokehcam_lab::synthetic::register();
@@ -67,8 +60,6 @@ fn run_command(args: &[OsString]) -> ExitCode {
         Err(ParseError::Arguments(error)) => return arguments::refuse(&error, args),
     };
     log::start(&cli.global);
-    #[cfg(feature = "networks")]
-    bokehcam::network::isolation::enable();
     if commands::reads_settings(&matches) {
         environment::warn_of_unknown();
     }

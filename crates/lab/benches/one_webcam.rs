@@ -15,8 +15,9 @@ use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::{Runtime, Task, find_best_in};
+use bokehcam::network::Task;
 use bokehcam::recording::{self, Recording, Scratch};
+use bokehcam::source::installed::find_best_in;
 use clap::Parser;
 use image::imageops::{FilterType, resize};
 
@@ -30,9 +31,6 @@ struct Options {
     /// Rounds of frames each, forth and back
     #[arg(long, default_value_t = 4)]
     rounds: u32,
-    /// What runs networks
-    #[arg(long, default_value = "auto")]
-    network_runtime: Runtime,
     /// Only this source
     #[arg(long, default_value = "")]
     only: String,
@@ -76,9 +74,7 @@ struct Case {
 fn measure_sources(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let (pictures, plate) = load_pictures(data, (options.size[0], options.size[1]))?;
     let (matte, mono) = (find_model(data, Task::Matte)?, find_model(data, Task::Mono)?);
-    let networks = |matte: Option<&Path>, mono: Option<&Path>| {
-        SingleCamera::open(matte, mono, &Hints::default(), options.network_runtime)
-    };
+    let networks = |matte: Option<&Path>, mono: Option<&Path>| SingleCamera::open(matte, mono, &Hints::default());
     let mut cases = Vec::new();
     for name in ["matte", "mono", "matte,mono", "plate", "plate,matte", "plate,matte,mono"] {
         if !options.only.is_empty() && name != options.only {

@@ -31,7 +31,7 @@ use super::tap::Tap;
 use super::{DepthError, DepthSource, FrameInput};
 use crate::compute::thread_pool::core_count;
 use crate::frame::{ColorImage, DepthMap, Mask};
-use crate::network::{self, Runtime, Task};
+use crate::network::{self, Task};
 
 /// Interval in frames of the depth network beside persons, per effort level: a room hardly moves. The person network
 /// runs in every frame, since outlines are valid for one frame only.
@@ -46,7 +46,7 @@ const MAX_GAP_NS: u64 = 500_000_000;
 /// Depth from networks that run on a camera's pictures.
 pub struct SingleCamera {
     name: String,
-    runtime: String,
+    runtime: &'static str,
     person: Option<PersonSegmenter>,
     absence: Absence,
     relative_depth: Option<RelativeDepth>,
@@ -71,22 +71,17 @@ impl SingleCamera {
     ///
     /// # Errors
     /// A network cannot be loaded, or is for another task.
-    pub fn open(
-        matte: Option<&Path>,
-        mono: Option<&Path>,
-        hints: &Hints,
-        runtime: Runtime,
-    ) -> Result<Self, DepthError> {
-        let (mut names, mut runtime_name) = (Vec::new(), String::new());
+    pub fn open(matte: Option<&Path>, mono: Option<&Path>, hints: &Hints) -> Result<Self, DepthError> {
+        let (mut names, mut runtime) = (Vec::new(), "");
         let mut load = |path: &Path, task| {
             let name = path.display().to_string();
             let failed = |why: String| DepthError::Network { name: name.clone(), why };
-            let loaded = network::load(path, runtime)?;
+            let loaded = network::load(path)?;
             if let Some(known) = loaded.known.filter(|known| known.task != task) {
                 return Err(failed(format!("this is {}, a network for --depth {}", known.file, known.task.name())));
             }
             names.push(loaded.known.map_or_else(|| name.clone(), |known| known.file.to_owned()));
-            runtime_name = loaded.network.runtime.clone();
+            runtime = loaded.network.runtime;
             PictureNetwork::new(loaded, task, hints).map_err(failed)
         };
         let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(PersonSegmenter::new);
@@ -94,7 +89,7 @@ impl SingleCamera {
         let has_subject = person.is_some();
         let mut networks = Self {
             name: names.join(" and "),
-            runtime: runtime_name,
+            runtime,
             person,
             absence: Absence::default(),
             relative_depth,

@@ -25,6 +25,11 @@ impl Size {
         self.rows * self.columns
     }
 
+    /// Returns the size with twice the rows and columns.
+    pub fn doubled(self) -> Self {
+        Self { rows: 2 * self.rows, columns: 2 * self.columns, ..self }
+    }
+
     /// Returns the number of values in memory.
     pub fn len(&self) -> usize {
         self.blocks() * self.plane()

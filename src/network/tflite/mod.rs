@@ -3,6 +3,7 @@
 //! reused as soon as it is free.
 
 mod filters;
+mod fuse;
 mod kernels;
 mod model;
 mod plan;
@@ -41,7 +42,7 @@ impl Tflite {
         };
         let (inputs, outputs) = (port(model.input), port(model.output));
         let engine = Box::new(Self::from_model(&model)?);
-        Ok(Network { engine, inputs, outputs, runtime: "the built-in TFLite runtime".to_owned() })
+        Ok(Network { engine, inputs, outputs, runtime: "the built-in TFLite runtime" })
     }
 
     fn from_model(model: &Model) -> Result<Self, String> {

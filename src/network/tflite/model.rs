@@ -93,12 +93,10 @@ impl Model {
         if tables.len().max(steps.len()) > MAX_PARTS {
             return Err(format!("it has more than {MAX_PARTS} tensors or operators"));
         }
-        let mut tensors =
-            tables.iter().map(|table| parse_tensor(table, &buffers)).collect::<Result<Vec<_>, String>>()?;
-        let in_all = tensors.iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum::<usize>();
-        if in_all > MAX_TOTAL_VALUES {
-            return Err(format!("its tensors have more than {MAX_TOTAL_VALUES} values"));
-        }
+        // Before the next one is read, as tensors may share a buffer.
+        let mut left = MAX_TOTAL_VALUES;
+        let tensor = |table| parse_tensor(table, &buffers, &mut left);
+        let mut tensors = tables.iter().map(tensor).collect::<Result<Vec<_>, String>>()?;
         let mut operators = Vec::new();
         for step in steps {
             let code = codes.get(step.int(0)? as usize).ok_or(TRUNCATED)?;
@@ -133,12 +131,15 @@ fn parse_code(table: &Table<'_>) -> Result<(i32, String), String> {
     Ok((number, String::from_utf8_lossy(table.bytes(1)?).into_owned()))
 }
 
-fn parse_tensor(table: &Table<'_>, buffers: &[Table<'_>]) -> Result<Tensor, String> {
+/// Parses a tensor, and subtracts its values from those that are `left`.
+fn parse_tensor(table: &Table<'_>, buffers: &[Table<'_>], left: &mut usize) -> Result<Tensor, String> {
     let shape = table.ints(0)?.into_iter().map(|side| usize::try_from(side).map_err(|_| TRUNCATED.to_owned()));
     let shape = shape.collect::<Result<Vec<_>, String>>()?;
     let name = String::from_utf8_lossy(table.bytes(3)?).into_owned();
     let count = shape.iter().try_fold(1usize, |all, &side| all.checked_mul(side)).filter(|&all| all <= MAX_VALUES);
     let count = count.ok_or_else(|| format!("{name:?} has more than {MAX_VALUES} values: {shape:?}"))?;
+    let rest = left.checked_sub(count);
+    *left = rest.ok_or_else(|| format!("its tensors have more than {MAX_TOTAL_VALUES} values"))?;
     let bytes = buffers.get(table.int(2)? as usize).ok_or(TRUNCATED)?.bytes(0)?;
     let values: Vec<f32> = match table.byte(1)? {
         0 => bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect(),

@@ -1,10 +1,16 @@
 //! The execution plan of a network: its steps and their shared memory. Each step is checked once, so that none can fail
 //! at run time.
 
+mod convolutions;
+
 use pulp::Arch;
 
+use super::fuse::fuse_operators;
 use super::kernels::{Axis, LaneCount, Size, filter_axes};
-use super::model::{Activation, MAX_TOTAL_VALUES, Model, Operator, OperatorKind, Tensor};
+use super::model::{Activation, MAX_TOTAL_VALUES, Model, Operator, OperatorKind, Strides, Tensor};
+
+/// Maximum number of multiplications for a picture: seconds; networks for live pictures need a hundredth.
+const MAX_WORK: usize = 1 << 35;
 
 /// The operation of a step.
 pub enum Operation {
@@ -58,6 +64,15 @@ pub struct Plan {
     pub output: (usize, Size),
 }
 
+/// The operation for an operator.
+struct Planned {
+    operation: Operation,
+    /// Size of its result, with the lanes of its input.
+    size: Size,
+    /// Number of multiplications for a value of the result.
+    work: usize,
+}
+
 /// The slot of a tensor.
 struct Allocation {
     slot: usize,
@@ -73,6 +88,10 @@ struct Planner<'a> {
     allocations: Vec<Option<Allocation>>,
     free: Vec<usize>,
     plan: Plan,
+    /// Number of values of all packed constants.
+    constants: usize,
+    /// Number of multiplications for a picture.
+    work: usize,
 }
 
 fn picture_size(tensor: &Tensor, lanes: impl Fn(usize) -> usize) -> Result<Size, String> {
@@ -93,7 +112,7 @@ impl Plan {
             Self { steps: Vec::new(), slots: vec![input.len()], scratch: 0, input: (0, input), output: (0, input) };
         let allocations = model.tensors.iter().map(|_| None).collect();
         let lanes = Arch::new().dispatch(LaneCount);
-        let mut planner = Planner { model, lanes, allocations, free: Vec::new(), plan };
+        let mut planner = Planner { model, lanes, allocations, free: Vec::new(), plan, constants: 0, work: 0 };
         planner.allocations[model.input] =
             Some(Allocation { slot: 0, size: input, uses: planner.count_uses(model.input) });
         let mut operators = model.operators.iter().peekable();
@@ -114,41 +133,7 @@ impl Plan {
     }
 }
 
-/// Fuses two operators into one, if the second reads the output of the first and the combination is supported.
-fn fuse_operators(first: &Operator, second: &Operator) -> Option<Operator> {
-    let other = |k: usize| second.inputs.get(1 - k).copied().filter(|&other| other != first.output);
-    let place = second.inputs.iter().position(|&input| input == first.output)?;
-    let mut both = Operator { output: second.output, ..first.clone() };
-    match (first.kind, second.kind) {
-        (_, OperatorKind::Activation(activation))
-            if first.activation == Activation::None && fuses_activation(first.kind) =>
-        {
-            both.activation = activation;
-        }
-        (OperatorKind::Scale, OperatorKind::Sum) if first.activation == Activation::None && first.inputs.len() == 2 => {
-            both.inputs.push(other(place)?);
-            both.activation = second.activation;
-        }
-        (OperatorKind::Sum, OperatorKind::Mean) if first.activation == Activation::None => {
-            both.kind = OperatorKind::Mean;
-        }
-        _ => return None,
-    }
-    Some(both)
-}
-
-/// Returns whether a step can apply an activation to its result.
-fn fuses_activation(kind: OperatorKind) -> bool {
-    matches!(
-        kind,
-        OperatorKind::Convolution(_)
-            | OperatorKind::Depthwise(_)
-            | OperatorKind::TransposedConvolution
-            | OperatorKind::Sum
-    )
-}
-
-impl Planner<'_> {
+impl<'a> Planner<'a> {
     /// Returns how many operators read a tensor; the network's output counts as one more.
     fn count_uses(&self, tensor: usize) -> usize {
         let by = self.model.operators.iter().flat_map(|operator| &operator.inputs).filter(|&&input| input == tensor);
@@ -163,8 +148,9 @@ impl Planner<'_> {
     }
 
     /// Returns the constants of a tensor; `None` in `shape` matches any size.
-    fn constant(&self, tensor: usize, shape: &[Option<usize>]) -> Result<(&[f32], &[usize]), String> {
-        let tensor = &self.model.tensors[tensor];
+    fn constant(&self, tensor: usize, shape: &[Option<usize>]) -> Result<(&'a [f32], &'a [usize]), String> {
+        let model = self.model;
+        let tensor = &model.tensors[tensor];
         let fits = tensor.shape.len() == shape.len()
             && !tensor.shape.contains(&0)
             && tensor.shape.iter().zip(shape).all(|(side, wanted)| wanted.is_none_or(|wanted| wanted == *side));
@@ -174,28 +160,14 @@ impl Planner<'_> {
         }
     }
 
-    fn padded_bias(&self, tensor: usize, channels: usize) -> Result<Vec<f32>, String> {
-        let (values, _) = self.constant(tensor, &[Some(channels)])?;
-        let mut bias = values.to_vec();
-        bias.resize(self.padded_channels(channels), 0.0);
-        Ok(bias)
-    }
-
     /// Rounds channels up to whole vectors.
     fn padded_channels(&self, channels: usize) -> usize {
         channels.next_multiple_of(self.lanes)
     }
 
-    /// Packs weights `[out][depth]` for [`super::kernels::Pointwise`].
-    fn pack_weights(&self, weights: &[f32], depth: usize) -> Vec<f32> {
-        let (out, all, lanes) = (weights.len() / depth, self.padded_channels(depth), self.lanes);
-        let mut packed = vec![0.0; self.padded_channels(out) * all];
-        for (channel, weights) in weights.chunks_exact(depth).enumerate() {
-            for (k, weight) in weights.iter().enumerate() {
-                packed[(channel / lanes * all + k) * lanes + channel % lanes] = *weight;
-            }
-        }
-        packed
+    fn reserve_constants(&mut self, values: usize) -> Result<(), String> {
+        self.constants = self.constants.saturating_add(values);
+        self.check_memory()
     }
 
     /// Ensures working memory for `values` values.
@@ -205,7 +177,12 @@ impl Planner<'_> {
     }
 
     fn check_memory(&self) -> Result<(), String> {
-        let values = self.plan.slots.iter().chain([&self.plan.scratch]).sum::<usize>();
+        let values = self
+            .plan
+            .slots
+            .iter()
+            .chain([&self.plan.scratch])
+            .fold(self.constants, |all, &one| all.saturating_add(one));
         if values > MAX_TOTAL_VALUES {
             Err(format!("it needs memory for more than {MAX_TOTAL_VALUES} values"))
         } else {
@@ -216,86 +193,17 @@ impl Planner<'_> {
     fn add_step(&mut self, operator: &Operator) -> Result<(), String> {
         let tensor = &self.model.tensors[operator.output];
         let wrong = || format!("an operator cannot make {:?}: {:?}", tensor.name, tensor.shape);
-        let [first, others @ ..] = &operator.inputs[..] else { return Err(wrong()) };
-        let (input, size) = self.find_picture(*first)?;
-        let lanes = self.lanes;
-        let result =
-            picture_size(tensor, |_| if operator.kind == OperatorKind::TransposedConvolution { 1 } else { lanes })?;
-        let in_vectors = size.lanes == lanes;
-        let made = |[rows, columns]: [usize; 2], channels: usize| Size { rows, columns, channels, ..result };
-        let like_input = Size { lanes: result.lanes, ..size };
-        let (operation, made) = match (operator.kind, others) {
-            (OperatorKind::Convolution(steps), &[weights, bias]) => {
-                let (weights, shape) = self.constant(weights, &[None, None, None, Some(size.channels)])?;
-                let ([out, down, across], bias) = ([shape[0], shape[1], shape[2]], self.padded_bias(bias, shape[0])?);
-                let (axes, sides) = filter_axes(&size, [down, across], &steps).ok_or_else(wrong)?;
-                let depth = down * across * size.channels;
-                let weights = self.pack_weights(weights, depth);
-                let alone = in_vectors && [down, across, steps.down, steps.across] == [1; 4];
-                let row = Size { rows: 1, columns: sides[1], channels: depth, lanes };
-                if !alone {
-                    self.reserve_scratch(row.len())?;
-                }
-                (Operation::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) }, made(sides, out))
-            }
-            (OperatorKind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
-                let (weights, shape) = self.constant(weights, &[Some(1), None, None, Some(size.channels)])?;
-                let taps = shape[1] * shape[2];
-                let (axes, sides) = filter_axes(&size, [shape[1], shape[2]], &steps).ok_or_else(wrong)?;
-                let mut spread = vec![0.0; taps * self.padded_channels(size.channels)];
-                for (tap, weights) in weights.chunks_exact(size.channels).enumerate() {
-                    for (channel, weight) in weights.iter().enumerate() {
-                        spread[(channel / lanes * taps + tap) * lanes + channel % lanes] = *weight;
-                    }
-                }
-                let bias = self.padded_bias(bias, size.channels)?;
-                let lines = axes[0].taps * axes[1].padded_len(size.columns, sides[1]) * lanes;
-                self.reserve_scratch(lines)?;
-                (Operation::Depthwise { weights: spread, bias, axes, lines }, made(sides, size.channels))
-            }
-            (OperatorKind::TransposedConvolution, &[weights, bias]) if in_vectors => {
-                let (weights, _) = self.constant(weights, &[Some(1), Some(2), Some(2), Some(size.channels)])?;
-                let (bias, _) = self.constant(bias, &[Some(1)])?;
-                let (mut four, weights) = (vec![bias[0]; 4], self.pack_weights(weights, size.channels));
-                four.resize(self.padded_channels(4), 0.0);
-                self.reserve_scratch(size.pixels() * four.len())?;
-                (Operation::TransposedConvolution { weights, bias: four }, made([2 * size.rows, 2 * size.columns], 1))
-            }
-            (OperatorKind::Activation(_), []) if in_vectors => {
-                (Operation::Elementwise { gate: None, b: None }, like_input)
-            }
-            (OperatorKind::Scale, &[gate, ref b @ ..]) if in_vectors => {
-                let ((gate, gate_size), b) =
-                    (self.find_picture(gate)?, b.first().map(|&b| self.find_picture(b)).transpose()?);
-                let is_gate = gate_size == Size { rows: 1, columns: 1, ..size };
-                if !is_gate || b.is_some_and(|(_, b)| b != size) {
-                    return Err(wrong());
-                }
-                (Operation::Elementwise { gate: Some(gate), b: b.map(|(slot, _)| slot) }, like_input)
-            }
-            (OperatorKind::Sum, &[b]) if in_vectors => {
-                let (b, b_size) = self.find_picture(b)?;
-                if b_size != size {
-                    return Err(wrong());
-                }
-                (Operation::Elementwise { gate: None, b: Some(b) }, like_input)
-            }
-            (OperatorKind::Mean, others) if in_vectors => {
-                // The second input is either the axes, or the second summand of a fused sum.
-                let b = others.iter().find_map(|&other| self.find_picture(other).ok());
-                if b.is_some_and(|(_, b)| b != size) {
-                    return Err(wrong());
-                }
-                (Operation::Mean { b: b.map(|(slot, _)| slot) }, Size { rows: 1, columns: 1, ..size })
-            }
-            (OperatorKind::Upsample, _) if in_vectors => {
-                self.reserve_scratch(size.columns * lanes)?;
-                (Operation::Upsample, made([2 * size.rows, 2 * size.columns], size.channels))
-            }
-            _ => return Err(wrong()),
-        };
-        if made != result {
+        let first = *operator.inputs.first().ok_or_else(wrong)?;
+        let (input, size) = self.find_picture(first)?;
+        let lanes = if operator.kind == OperatorKind::TransposedConvolution { 1 } else { self.lanes };
+        let result = picture_size(tensor, |_| lanes)?;
+        let Planned { operation, size: made, work } = self.plan_operation(operator, size)?.ok_or_else(wrong)?;
+        if (Size { lanes, ..made }) != result {
             return Err(wrong());
+        }
+        self.work = self.work.saturating_add(result.len().saturating_mul(work));
+        if self.work > MAX_WORK {
+            return Err(format!("it needs more than {MAX_WORK} multiplications for a picture"));
         }
         let activation = match operator.kind {
             OperatorKind::Activation(activation) => activation,
@@ -310,6 +218,50 @@ impl Planner<'_> {
         self.allocations[operator.output] =
             Some(Allocation { slot: output, size: result, uses: self.count_uses(operator.output) });
         Ok(())
+    }
+
+    /// Plans the operation of an operator on a picture of this size; `None` if it cannot work on it.
+    fn plan_operation(&mut self, operator: &Operator, size: Size) -> Result<Option<Planned>, String> {
+        let in_vectors = size.lanes == self.lanes;
+        let others = operator.inputs.get(1..).unwrap_or_default();
+        let like_input = |operation| Some(Planned { operation, size, work: 1 });
+        Ok(match (operator.kind, others) {
+            (OperatorKind::Convolution(steps), &[weights, bias]) => {
+                self.plan_convolution(size, &steps, [weights, bias])?
+            }
+            (OperatorKind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
+                self.plan_depthwise(size, &steps, [weights, bias])?
+            }
+            (OperatorKind::TransposedConvolution, &[weights, bias]) if in_vectors => {
+                Some(self.plan_transposed(size, [weights, bias])?)
+            }
+            (OperatorKind::Activation(_), []) if in_vectors => {
+                like_input(Operation::Elementwise { gate: None, b: None })
+            }
+            (OperatorKind::Scale, &[gate, ref b @ ..]) if in_vectors => {
+                let (gate, gate_size) = self.find_picture(gate)?;
+                let b = b.first().map(|&b| self.find_picture(b)).transpose()?;
+                let fits = gate_size == Size { rows: 1, columns: 1, ..size } && b.is_none_or(|(_, b)| b == size);
+                let b = b.map(|(slot, _)| slot);
+                fits.then_some(Operation::Elementwise { gate: Some(gate), b }).and_then(like_input)
+            }
+            (OperatorKind::Sum, &[b]) if in_vectors => {
+                let (b, b_size) = self.find_picture(b)?;
+                (b_size == size).then_some(Operation::Elementwise { gate: None, b: Some(b) }).and_then(like_input)
+            }
+            (OperatorKind::Mean, others) if in_vectors => {
+                // The second input is either the axes, or the second summand of a fused sum.
+                let b = others.iter().find_map(|&other| self.find_picture(other).ok());
+                let operation = Operation::Mean { b: b.map(|(slot, _)| slot) };
+                let mean = Planned { operation, size: Size { rows: 1, columns: 1, ..size }, work: size.pixels() };
+                b.is_none_or(|(_, b)| b == size).then_some(mean)
+            }
+            (OperatorKind::Upsample, _) if in_vectors => {
+                self.reserve_scratch(size.columns * self.lanes)?;
+                Some(Planned { operation: Operation::Upsample, size: size.doubled(), work: 4 })
+            }
+            _ => None,
+        })
     }
 
     /// Allocates a slot for `values` values: the smallest free one that is large enough, or else the largest free one,

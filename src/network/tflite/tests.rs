@@ -172,6 +172,27 @@ fn what_does_not_fit_together_is_refused() {
     });
 }
 
+#[test]
+fn what_takes_too_long_or_too_much_memory_is_refused_before_it_runs() {
+    let wide = |count: usize, out: usize| {
+        let mut net = Builder::new([1, 512, 512, 3]);
+        for _ in 0..count {
+            net.filter(Some(out), [3, 3], ONE, Activation::None);
+        }
+        Tflite::from_model(&net.model).map(drop)
+    };
+    wide(2, 16).unwrap();
+    assert!(wide(1 << 8, 32).unwrap_err().contains("multiplications"));
+    // Weights that many operators share are packed for each.
+    let mut net = Builder::new([1, 1, 1, 1]);
+    let (weights, bias) = (net.constant(&[1 << 20, 1, 1, 1]), net.constant(&[1 << 20]));
+    for _ in 0..16 {
+        let inputs = [0, weights, bias];
+        net.add(OperatorKind::Convolution(ONE), Activation::None, &inputs, [1, 1, 1, 1 << 20]);
+    }
+    assert!(Tflite::from_model(&net.model).err().unwrap().contains("memory"));
+}
+
 /// Returns a network as a file: a filter with 16-bit weights, and a logistic function.
 fn small_file() -> Vec<u8> {
     use Value::{Byte, Bytes, Int, Ints, Table, Tables};

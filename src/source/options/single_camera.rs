@@ -1,4 +1,4 @@
-//! Options of depth from a single camera: a clean plate, networks, and how they are run.
+//! Options of depth from a single camera: a clean plate, and networks.
 
 // The help texts contain brackets that are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
@@ -12,17 +12,13 @@ use clap::Args;
 #[cfg(feature = "networks")]
 use crate::names;
 #[cfg(feature = "networks")]
-use crate::network::{Runtime, Scaling};
+use crate::network::Scaling;
 
 /// Networks that make depth from the pictures of one camera.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "clap", derive(Args))]
 #[cfg_attr(feature = "clap", command(next_help_heading = "Networks"))]
 pub struct Networks {
-    /// Runtime for networks [default: auto]
-    #[cfg(feature = "networks")]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "WHICH", value_parser = names::parse_name::<Runtime>))]
-    pub network_runtime: Option<Runtime>,
     /// Input range of an unknown network, from black to white: unit (0 to 1), signed (-1 to 1), codes (0 to 255) or
     /// imagenet (normalized by the mean and deviation of ImageNet) [default: unit for a matte, imagenet for depth]
     #[cfg(feature = "networks")]

@@ -9,7 +9,8 @@ use clap::{Args, Subcommand};
 use crate::error::CliError;
 use crate::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam::files::{atomic_file, input};
-use bokehcam::network::{self, KNOWN_NETWORKS, KnownNetwork};
+use bokehcam::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES};
+use bokehcam::source::installed::{installed_networks, model_folders};
 
 /// List the networks that find depth in pictures of a single camera, and install them
 #[derive(Args, Debug)]
@@ -57,7 +58,7 @@ pub fn run(command: &ModelsCommand) -> Result<(), CliError> {
 }
 
 fn format_list() -> String {
-    let installed = network::installed_networks();
+    let installed = installed_networks();
     let mut text = String::from("known networks, the best of each task first:\n");
     for known in &KNOWN_NETWORKS {
         let place = installed.iter().find(|(other, _)| std::ptr::eq(*other, known));
@@ -71,17 +72,9 @@ fn format_list() -> String {
             task = task.name(),
         );
     }
-    let folders: Vec<String> = network::model_folders().iter().map(|folder| folder.display().to_string()).collect();
+    let folders: Vec<String> = model_folders().iter().map(|folder| folder.display().to_string()).collect();
     text += &format!("\nlooked for in {}\n", folders.join(", "));
-    match network::onnx_runtime_version() {
-        Ok(name) => text += &format!(".tflite runs on the built-in runtime, .onnx on {name}\n"),
-        Err(why) => {
-            text += &format!(
-                ".onnx runs on the built-in runtime, and would be 1.5 to 3 times as fast with ONNX Runtime: {why}\n"
-            )
-        }
-    }
-    text
+    text + ".tflite runs on bokehcam's own runtime, .onnx on rten\n"
 }
 
 fn add_file(file: &Path) -> Result<(), CliError> {
@@ -89,7 +82,7 @@ fn add_file(file: &Path) -> Result<(), CliError> {
         let what = "there is no such file: `bokehcam models get NAME` fetches a known network";
         return Err(CliError::Usage(format!("{}: {what}", file.display())));
     }
-    let bytes = input::read(file, network::MAX_BYTES).map_err(CliError::io(file))?;
+    let bytes = input::read(file, MAX_BYTES).map_err(CliError::io(file))?;
     let known = KnownNetwork::identify(&bytes).ok_or_else(|| {
         let what = "it is not a known network (`bokehcam models` lists them), or is incomplete; your own network needs \
                     no installation: use --depth matte:FILE or mono:FILE";
@@ -101,10 +94,10 @@ fn add_file(file: &Path) -> Result<(), CliError> {
 /// Writes a network into this user's folder; an existing file is kept.
 fn install(known: &KnownNetwork, bytes: &[u8]) -> Result<(), CliError> {
     let no_home = || CliError::Usage("there is no home folder to install it in: set HOME or XDG_DATA_HOME".to_owned());
-    let folder = network::model_folders().into_iter().next().ok_or_else(no_home)?;
+    let folder = model_folders().into_iter().next().ok_or_else(no_home)?;
     let target = folder.join(known.file);
     std::fs::create_dir_all(&folder).map_err(CliError::io(&folder))?;
-    match input::read(&target, network::MAX_BYTES) {
+    match input::read(&target, MAX_BYTES) {
         Ok(there) if there == bytes => {}
         Ok(_) => {
             let what = "there is another file of this name: move it away";
@@ -127,7 +120,7 @@ fn fetch(name: Option<&str>) -> Result<(), CliError> {
     };
     let known =
         name.map_or(Ok(&KNOWN_NETWORKS[0]), |name| KnownNetwork::find_by_name(name).ok_or_else(|| unknown(name)))?;
-    if let Some((_, file)) = network::installed_networks().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
+    if let Some((_, file)) = installed_networks().iter().find(|(other, _)| std::ptr::eq(*other, known)) {
         print_to_stderr(&format!("{}: installed already, as {}", known.file, file.display()));
         return Ok(());
     }

@@ -103,7 +103,7 @@ const NEEDS: &[Requirement] = &[
     (&["max-disparity", "rectified", "calib", "focal-px", "baseline-m", "doffs-px"], |run| {
         (run.depth != DepthOrigin::Stereo).then_some("depth does not come from two cameras")
     }),
-    (&["network-runtime", "network-range", "network-order"], |run| {
+    (&["network-range", "network-order"], |run| {
         (run.depth != DepthOrigin::Networks).then_some("no network makes the depth")
     }),
     (&["focus"], |run| needs_dof(run).filter(|_| !run.lens)),

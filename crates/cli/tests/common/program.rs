@@ -234,6 +234,14 @@ impl Beside {
         listed.split_whitespace().filter_map(|id| Pid::from_raw(id.parse().ok()?)).collect()
     }
 
+    /// Returns the ids of its threads of this name.
+    pub fn threads(&self, name: &str) -> Vec<std::ffi::OsString> {
+        let tasks = fs::read_dir(format!("/proc/{}/task", self.0.id())).into_iter().flatten().flatten();
+        let is_named =
+            |task: &fs::DirEntry| fs::read_to_string(task.path().join("comm")).is_ok_and(|comm| comm.trim() == name);
+        tasks.filter(is_named).map(|task| task.file_name()).collect()
+    }
+
     /// Waits for the process to end; returns the unread output. Stdout may be binary.
     #[track_caller]
     pub fn end(mut self, within: Duration) -> Ran {

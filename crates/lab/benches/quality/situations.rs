@@ -14,7 +14,8 @@ use bokehcam::depth::plate::{Capture, CaptureResult, Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
-use bokehcam::network::{self, Runtime, Task};
+use bokehcam::network::Task;
+use bokehcam::source::installed::{find_best, find_best_in};
 use bokehcam_lab::scene::{Scene, Situation, ThinLens, View};
 use serde::Serialize;
 
@@ -116,7 +117,7 @@ fn render_situation(situation: Situation) -> RenderedSituation {
 fn estimate_depths(rendered: &RenderedSituation) -> Vec<(&'static str, DepthMap)> {
     let [matte, mono] = [Task::Matte, Task::Mono].map(find_model);
     let networks = |matte: &Option<PathBuf>, mono: &Option<PathBuf>| {
-        SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default(), Runtime::Auto).ok()
+        SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default()).ok()
     };
     let alone = |networks: Option<SingleCamera>| networks.map(|networks| Box::new(networks) as Box<dyn DepthSource>);
     let with_plate = |companion: Option<SingleCamera>| -> Option<Box<dyn DepthSource>> {
@@ -166,7 +167,7 @@ fn capture_plate(rendered: &RenderedSituation) -> ColorImage {
 /// Returns a known network for a task.
 fn find_model(task: Task) -> Option<PathBuf> {
     let data = std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from);
-    data.and_then(|data| network::find_best_in(vec![data.join("models")], task)).or_else(|| network::find_best(task))
+    data.and_then(|data| find_best_in(vec![data.join("models")], task)).or_else(|| find_best(task))
 }
 
 fn score_depth(rendered: &RenderedSituation, source: &'static str, depth: DepthMap) -> Result<Outcome, BokehError> {

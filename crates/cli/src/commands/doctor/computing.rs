@@ -1,4 +1,4 @@
-//! Checks of the blur's executor, the networks' runtime, and external programs.
+//! Checks of the blur's executor, the networks, and external programs.
 
 use std::process::{Command, Stdio};
 
@@ -16,33 +16,26 @@ const PROGRAMS: &str = "programs";
 pub fn check_computing() -> Vec<Finding> {
     let mut findings = vec![check_blur()];
     #[cfg(feature = "networks")]
-    findings.extend(check_networks());
+    findings.push(check_networks());
     findings.push(check_ffmpeg());
     findings
 }
 
-/// Checks whether a single camera can give a portrait, and how fast networks run.
+/// Checks whether a single camera can give a portrait.
 #[cfg(feature = "networks")]
-fn check_networks() -> Vec<Finding> {
-    use bokehcam::network::{self, Task};
-    let installed = network::installed_networks();
+fn check_networks() -> Finding {
+    use bokehcam::network::Task;
+    let installed = bokehcam::source::installed::installed_networks();
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
-    let models = match persons {
+    match persons {
         true => Finding::good(NETWORKS, format!("a single camera gives a portrait, by {}", names.join(", "))),
         false => Finding::note(
             NETWORKS,
             "none that finds persons, so a single camera gives no portrait",
             "`bokehcam models get` installs one (250 kB); --depth plate needs none",
         ),
-    };
-    let runtime = match network::onnx_runtime_version() {
-        Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
-        Err(why) => {
-            Finding::note(NETWORKS, "your own networks run on the built-in runtime; ONNX Runtime is faster", why)
-        }
-    };
-    vec![models, runtime]
+    }
 }
 
 /// Reports the executor that `--backend auto` chooses here.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::DepthMap;
-use bokehcam::network::{KNOWN_NETWORKS, KnownNetwork, Runtime, Task};
+use bokehcam::network::{KNOWN_NETWORKS, KnownNetwork, Task};
 
 use super::onnx::matte;
 use super::{WEIGHTS, disc, read, real, written};
@@ -58,7 +58,7 @@ fn the_known_networks_run_and_are_installed() {
     for file in files() {
         let Some(known) = KnownNetwork::identify(&fs::read(&file).unwrap()) else { continue };
         let (matte, mono) = if known.task == Task::Matte { (Some(&*file), None) } else { (None, Some(&*file)) };
-        let mut camera = SingleCamera::open(matte, mono, &Hints::default(), Runtime::BuiltIn)
+        let mut camera = SingleCamera::open(matte, mono, &Hints::default())
             .unwrap_or_else(|error| panic!("{}: {error}", known.file));
         assert!(read(&mut camera, &color, 0).metres.iter().all(|&metres| DepthMap::is_known(metres)));
         add(&file).done();

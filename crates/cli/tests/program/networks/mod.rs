@@ -15,7 +15,7 @@ use std::time::Duration;
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::{self, Runtime, Tensor};
+use bokehcam::network::{self, Tensor};
 use onnx::{Side, constant, conv, matte, model, node, port};
 use tempfile::TempDir;
 
@@ -30,8 +30,8 @@ fn written(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-fn camera(file: &Path, runtime: Runtime) -> SingleCamera {
-    SingleCamera::open(Some(file), None, &Hints::default(), runtime).unwrap()
+fn camera(file: &Path) -> SingleCamera {
+    SingleCamera::open(Some(file), None, &Hints::default()).unwrap()
 }
 
 fn read(camera: &mut dyn DepthSource, color: &ColorImage, frame: u64) -> DepthMap {
@@ -63,7 +63,7 @@ fn disc(width: u32, height: u32, (x, y): (f32, f32), radius_px: f32) -> (ColorIm
 fn a_network_gives_what_its_layers_say() {
     let folder = TempDir::new().unwrap();
     let file = written(&folder, "sum.onnx", &matte(8, 4, [1.0, 2.0, -3.0], 0.25));
-    let mut network = network::load(&file, Runtime::BuiltIn).unwrap().network;
+    let mut network = network::load(&file).unwrap().network;
     let values: Vec<f32> = (0..96).map(|k| k as f32 / 96.0).collect();
     let mut outputs = Vec::new();
     network.run(&[Tensor { shape: vec![1, 3, 4, 8], values: values.clone() }], &mut outputs).unwrap();
@@ -81,7 +81,7 @@ fn a_coarse_mask_becomes_the_share_of_every_pixel() {
     // The network's input has a tenth of the picture's size.
     let file = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
     let (color, shares) = disc(320, 240, (163.0, 118.0), 70.0);
-    let map = read(&mut camera(&file, Runtime::BuiltIn), &color, 0);
+    let map = read(&mut camera(&file), &color, 0);
     assert_eq!(map.subject_m, Some(1.0));
     let mut found: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();
     for pixel in &map.matte.pixels {
@@ -105,7 +105,7 @@ fn what_is_seen_aside_is_what_is_seen_at_once() {
     let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
     // Blue is nearer than red.
     let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
-    let open = || SingleCamera::open(Some(&person), Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let open = || SingleCamera::open(Some(&person), Some(&depth), &Hints::default()).unwrap();
     let [(first, _), (second, _)] = [100.0, 220.0].map(|x| disc(320, 240, (x, 118.0), 60.0));
     let (mut at_once, mut live) = (open(), open());
     let finest = live.efforts().len() - 1;
@@ -126,8 +126,7 @@ fn each_frame_has_a_mask_of_its_own_at_every_effort() {
     let folder = TempDir::new().unwrap();
     let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
     let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
-    let open =
-        |mono: Option<&Path>| SingleCamera::open(Some(&person), mono, &Hints::default(), Runtime::BuiltIn).unwrap();
+    let open = |mono: Option<&Path>| SingleCamera::open(Some(&person), mono, &Hints::default()).unwrap();
     let (mut finest, mut least) = (open(None), open(None));
     least.set_effort(0);
     for frame in 0..8u64 {
@@ -135,7 +134,7 @@ fn each_frame_has_a_mask_of_its_own_at_every_effort() {
         assert!(read(&mut least, &color, frame) == read(&mut finest, &color, frame), "frame {frame}");
     }
     assert!(!least.is_reusable() && !open(Some(&*depth)).is_reusable());
-    let alone = SingleCamera::open(None, Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let alone = SingleCamera::open(None, Some(&depth), &Hints::default()).unwrap();
     assert!(alone.is_reusable(), "what is near and far is no mask");
 }
 
@@ -145,7 +144,7 @@ fn without_a_person_nothing_is_as_near_as_one() {
     let folder = TempDir::new().unwrap();
     let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
     let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
-    let mut both = SingleCamera::open(Some(&person), Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let mut both = SingleCamera::open(Some(&person), Some(&depth), &Hints::default()).unwrap();
     let mut wall = ColorImage::new(320, 240);
     wall.rgb.chunks_exact_mut(3).enumerate().for_each(|(at, pixel)| pixel[2] = 128 + (at % 320 / 4) as u8);
     let map = read(&mut both, &wall, 0);
@@ -158,7 +157,7 @@ fn without_a_person_nothing_is_as_near_as_one() {
 fn still_pictures_share_a_map_and_moved_ones_do_not() {
     let folder = TempDir::new().unwrap();
     let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
-    let (mut reusing, mut fresh) = (camera(&person, Runtime::BuiltIn), camera(&person, Runtime::BuiltIn));
+    let (mut reusing, mut fresh) = (camera(&person), camera(&person));
     reusing.set_reuse(true);
     let mut frame = 0;
     let mut read_both = |x: f32, flicker: u8| {
@@ -208,7 +207,7 @@ fn what_a_network_is_shown_may_lie_any_way_and_be_of_any_size() {
         &[port("out", &any(2))],
     );
     for (name, bytes) in [("planes", planes), ("beside", beside), ("any size", any_size), ("two", two)] {
-        let map = read(&mut camera(&written(&folder, "m.onnx", &bytes), Runtime::BuiltIn), &color, 0);
+        let map = read(&mut camera(&written(&folder, "m.onnx", &bytes)), &color, 0);
         assert_eq!((map.metres[24 * 64 + 32], map.metres[0]), (1.0, 1000.0), "{name}");
     }
 }
@@ -236,7 +235,7 @@ fn a_network_with_a_memory_gets_back_what_it_gave() {
     );
     let mut red = ColorImage::new(16, 16);
     red.rgb.chunks_mut(3).for_each(|pixel| pixel[0] = 255);
-    let mut camera = camera(&written(&folder, "r.onnx", &recurrent), Runtime::BuiltIn);
+    let mut camera = camera(&written(&folder, "r.onnx", &recurrent));
     // The sixth frame is the first above the threshold.
     let near: Vec<bool> = (0..7).map(|frame| read(&mut camera, &red, frame).metres[0] <= 1.0).collect();
     assert_eq!(near.iter().position(|near| *near), Some(5), "{near:?}");
@@ -249,7 +248,7 @@ fn streamed(home: &Home, name: &str, bytes: &[u8], frames: &str) -> Ran {
     let file = format!("{name}.onnx");
     written(&home.0, &file, bytes);
     let matte = format!("matte:{file}");
-    let stream = ["stream", PORTRAIT, "--depth", &matte, "--network-runtime", "built-in", "--to", "null"];
+    let stream = ["stream", PORTRAIT, "--depth", &matte, "--to", "null"];
     home.run(&[&stream[..], &["--frames", frames]].concat())
 }
 
@@ -286,22 +285,6 @@ fn a_bad_file_is_refused_in_one_line() {
     for (depth, said) in [("matte:nowhere.onnx", "nowhere.onnx: No such file"), ("matte", "`bokehcam models get")] {
         home.run(&["stream", PORTRAIT, "--depth", depth, "--to", "null"]).failed(1, &[said]);
     }
-}
-
-#[test]
-fn without_onnx_runtime_what_is_built_in_is_used_and_what_was_asked_for_is_missed() {
-    let home = Home::new();
-    written(&home.0, "m.onnx", &matte(8, 4, WEIGHTS, 0.0));
-    // A file that is not a library.
-    let library = written(&home.0, "libonnxruntime.so", b"nothing");
-    let run = |runtime: &str| {
-        let stream = ["stream", PORTRAIT, "--frames", "2", "--depth", "matte:m.onnx", "--to", "null"];
-        let stream = [&stream[..], &["--network-runtime", runtime]].concat();
-        Ran::of(home.command(&stream).env("ORT_DYLIB_PATH", &library))
-    };
-    let auto = run("auto");
-    assert!(auto.done().contains("run by the built-in runtime"), "{}", auto.stderr);
-    run("onnx-runtime").refused(1, &["ONNX Runtime"]);
 }
 
 #[test]

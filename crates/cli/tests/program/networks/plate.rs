@@ -3,7 +3,7 @@
 use bokehcam::depth::plate::{PlateDepth, Step};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{Runtime, Task};
+use bokehcam::network::Task;
 
 use tempfile::TempDir;
 
@@ -19,7 +19,7 @@ const AWAY_PX: usize = 10;
 /// also returns where it is known.
 fn background(sequence: &Sequence) -> (ColorImage, Vec<bool>) {
     let matte = model(Task::Matte);
-    let mut person = SingleCamera::open(Some(&matte), None, &Hints::default(), Runtime::Auto).unwrap();
+    let mut person = SingleCamera::open(Some(&matte), None, &Hints::default()).unwrap();
     let mut samples: Vec<Vec<[u8; 3]>> = Vec::new();
     let mut size = (0, 0);
     for index in 0..sequence.len() {
@@ -104,8 +104,7 @@ fn a_real_person_before_a_plate_is_found() {
 fn a_plate_and_networks_know_more_together() {
     let folder = TempDir::new().unwrap();
     let file = written(&folder, "m.onnx", &matte(64, 36, WEIGHTS, 0.0));
-    let networks = SingleCamera::open(Some(&file), Some(&file), &Hints::default(), Runtime::BuiltIn)
-        .expect("the test's own network");
+    let networks = SingleCamera::open(Some(&file), Some(&file), &Hints::default()).expect("the test's own network");
     let mut source = PlateDepth::new(None, None, Some(Box::new(networks)));
     let guide = source.guide();
     let (person, shares) = disc(320, 180, (160.0, 90.0), 40.0);

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{KNOWN_NETWORKS, Runtime, Task, Tensor, find_best_in};
+use bokehcam::network::{KNOWN_NETWORKS, Task, Tensor};
 use bokehcam::recording::{Options, Recording, Scratch};
+use bokehcam::source::installed::find_best_in;
 
 use super::read;
 use crate::program::Home;
@@ -61,9 +62,7 @@ impl Sequence {
 #[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
 fn a_real_person_is_found_and_what_rests_rests() {
     let (matte, mono) = (model(Task::Matte), model(Task::Mono));
-    let open = |matte: Option<&Path>, mono: Option<&Path>| {
-        SingleCamera::open(matte, mono, &Hints::default(), Runtime::Auto).unwrap()
-    };
+    let open = |matte: Option<&Path>, mono: Option<&Path>| SingleCamera::open(matte, mono, &Hints::default()).unwrap();
     let sequence = Sequence::open();
     let mut both = open(Some(&matte), Some(&mono));
     let mut relief = open(None, Some(&mono));
@@ -146,7 +145,7 @@ fn shipped() -> PathBuf {
 }
 
 fn load(file: &Path) -> bokehcam::network::Network {
-    bokehcam::network::load(file, Runtime::BuiltIn).unwrap().network
+    bokehcam::network::load(file).unwrap().network
 }
 
 #[test]
@@ -162,7 +161,7 @@ fn what_the_package_brings_is_installed_and_sees_nobody_in_a_grey_wall() {
     assert!(mask[0].values.iter().all(|share| (0.0..0.5).contains(share)));
 }
 
-/// The packaged network runs without ONNX Runtime, and matches ONNX Runtime's result for the same weights.
+/// The packaged network, run by our own code, matches the library's result for the same weights.
 #[test]
 #[ignore = "needs BOKEHCAM_DATA and the network for persons, as `scripts/setup models` brings it"]
 fn the_mask_of_what_the_package_brings_is_that_of_the_library() {

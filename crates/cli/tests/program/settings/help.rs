@@ -22,8 +22,7 @@ fn the_first_page_has_what_most_people_need_and_another_has_all() {
     assert!(first.contains("\n            matte[:FILE]") && first.contains("\n            FOLDER"), "a list: {first}");
     assert_eq!(options(&page(&["stream", "-h"])), options(&first));
     let all = page(&["stream", "--help-all"]);
-    for option in
-        options(&first).into_iter().chain(["--rank", "--report", "--network-runtime", "--keep-going", "--name"])
+    for option in options(&first).into_iter().chain(["--rank", "--report", "--network-range", "--keep-going", "--name"])
     {
         assert!(options(&all).contains(&option), "{option}");
     }

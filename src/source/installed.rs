@@ -3,8 +3,8 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use super::{KnownNetwork, MAX_BYTES, Task};
-use crate::files::{data, input, trusted};
+use crate::files::{data, input};
+use crate::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES, Task};
 
 /// Names the folder of networks that takes the place of those beside the program.
 const VARIABLE: &str = "BOKEHCAM_MODELS";
@@ -13,7 +13,7 @@ const VARIABLE: &str = "BOKEHCAM_MODELS";
 /// (`program_folders`) or `$BOKEHCAM_MODELS` in their place, and `bokehcam/models` in each of `$XDG_DATA_DIRS`.
 pub fn model_folders() -> Vec<PathBuf> {
     let of_data = |folder: PathBuf| folder.join("bokehcam/models");
-    let of_program = match trusted::absolute_env_path(VARIABLE) {
+    let of_program = match data::absolute_env_path(VARIABLE) {
         Some(folder) => vec![folder],
         None => env::current_exe().map_or_else(|_| Vec::new(), |program| program_folders(&program)),
     };
@@ -61,7 +61,7 @@ fn find_known_in(folders: Vec<PathBuf>) -> Vec<(&'static KnownNetwork, PathBuf)>
         .filter(has_known_size)
         .filter_map(|file| Some((KnownNetwork::identify(&input::read(&file, MAX_BYTES).ok()?)?, file)))
         .collect();
-    let rank = |known: &KnownNetwork| super::KNOWN_NETWORKS.iter().position(|other| std::ptr::eq(other, known));
+    let rank = |known: &KnownNetwork| KNOWN_NETWORKS.iter().position(|other| std::ptr::eq(other, known));
     found.sort_by_key(|(known, _)| rank(known));
     found.dedup_by_key(|(known, _)| known.sha256);
     found
