@@ -26,6 +26,13 @@ pub enum CalibrationError {
         hint: String,
         formats: String,
     },
+    /// The format is read after a conversion.
+    #[error("{}: {format} is not read; \"Convert a calibration\" in docs/recordings.md has the lines for it", path.display())]
+    Unconverted {
+        path: PathBuf,
+        /// The format, as the subject of a sentence.
+        format: &'static str,
+    },
     /// The number of files is wrong.
     #[error("a calibration consists of one or two files, but {0} were given")]
     Files(usize),
@@ -102,7 +109,7 @@ pub enum Fault {
     /// The file does not have its format's syntax.
     #[error("not readable as {format}: {what}")]
     Syntax {
-        /// YAML, XML or INI.
+        /// YAML or INI.
         format: &'static str,
         what: String,
     },

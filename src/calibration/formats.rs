@@ -17,10 +17,10 @@ pub struct Format {
 }
 
 /// All formats that `--calib` reads. The last two are of pictures that are rectified.
-pub const FORMATS: [Format; 9] = [
+pub const FORMATS: [Format; 8] = [
     Format {
         name: "OpenCV",
-        files: "stereo.yml or .xml, or intrinsics.yml and extrinsics.yml",
+        files: "stereo.yml, or intrinsics.yml and extrinsics.yml",
         keys: &[&["M1", "D1", "M2", "D2", "R", "T"], &["M1", "D1", "M2", "D2", "R1", "R2", "P1", "P2"]],
     },
     Format {
@@ -40,16 +40,6 @@ pub const FORMATS: [Format; 9] = [
         name: "EuRoC",
         files: "sensor.yaml of both cameras",
         keys: &[&["T_BS", "intrinsics", "distortion_coefficients"]],
-    },
-    Format {
-        name: "ORB-SLAM",
-        files: "EuRoC.yaml",
-        keys: &[
-            &["Camera1.fx", "Camera2.fx", "Stereo.T_c1_c2"],
-            &["LEFT.K", "LEFT.D", "LEFT.R", "LEFT.P", "RIGHT.K", "RIGHT.D", "RIGHT.R", "RIGHT.P"],
-            &["Camera.fx", "Camera.bf"],
-            &["Camera1.fx", "Stereo.b"],
-        ],
     },
     Format { name: "ZED", files: "SN*.conf", keys: &[&["LEFT_CAM_HD", "RIGHT_CAM_HD", "STEREO"]] },
     Format {

@@ -1,6 +1,6 @@
-//! Parses INI files: sections of `KEY=VALUE` lines; `;` and `#` begin comments.
+//! Parses INI files, as of ZED cameras: sections of `KEY=VALUE` lines; `;` and `#` begin comments.
 
-use super::tree::{Kind, Node};
+use super::yaml::{Kind, Node};
 
 /// Returns the name of a line `[SECTION]`.
 fn section_name(line: &str) -> Option<&str> {

@@ -73,7 +73,7 @@ impl Distortion {
     }
 
     /// Inverts [`Distortion::distort`]. Points beyond `max_radius` are clamped to it.
-    pub fn undistort(&self, point: DVec2, max_radius: f64) -> DVec2 {
+    fn undistort(&self, point: DVec2, max_radius: f64) -> DVec2 {
         let length = point.length();
         if length == 0.0 && self.distort(point) == point {
             return point;

@@ -23,8 +23,6 @@ pub mod map;
 mod oak;
 #[cfg(feature = "files")]
 mod opencv;
-#[cfg(feature = "files")]
-mod orbslam;
 pub mod rectification;
 pub mod rectifier;
 pub mod registration;
@@ -34,8 +32,6 @@ mod ros;
 mod stored;
 #[cfg(feature = "files")]
 mod tree;
-#[cfg(feature = "files")]
-mod xml;
 #[cfg(feature = "files")]
 mod yaml;
 #[cfg(feature = "files")]
@@ -168,10 +164,11 @@ pub fn load_calibration_for(paths: &[&Path], size: Option<(u32, u32)>) -> Result
         _ => {}
     }
     if !opencv::is_opencv(&files) {
-        return match files.iter().find(|file| orbslam::is_settings(file)) {
-            Some(settings) => orbslam::from_file(settings),
-            None => Err(CalibrationError::unknown_format(paths[0])),
-        };
+        let is_orb_slam = |file: &tree::File| file.root().find(|key| ORB_SLAM_KEYS.contains(&key)).is_some();
+        return Err(match files.iter().any(is_orb_slam) {
+            true => CalibrationError::Unconverted { path: paths[0].to_owned(), format: "ORB-SLAM's format" },
+            false => CalibrationError::unknown_format(paths[0]),
+        });
     }
     let companion = find_companion_file(paths[0], ["intrinsic", "extrinsic"]);
     if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), companion) {
@@ -179,6 +176,10 @@ pub fn load_calibration_for(paths: &[&Path], size: Option<(u32, u32)>) -> Result
     }
     opencv::from_files(&files)
 }
+
+/// Entries of ORB-SLAM's settings.
+#[cfg(feature = "files")]
+const ORB_SLAM_KEYS: [&str; 3] = ["Camera1.fx", "Camera.fx", "LEFT.K"];
 
 /// Returns the file beside `path` with the second word for the first in its name, or the other way round, if it exists.
 #[cfg(feature = "files")]

@@ -1,6 +1,5 @@
-//! Reads OpenCV's FileStorage, YAML or XML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2
-//! D2 R T), the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two. ORB_SLAM2's settings have the
-//! same entries by other names (LEFT.K, RIGHT.P).
+//! Reads OpenCV's FileStorage, in YAML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2 R
+//! T), the results of `stereoRectify` (R1 R2 P1 P2), or both, in one file or two.
 
 use glam::DVec3;
 
@@ -23,20 +22,11 @@ const POSE_HINT: &str = "name the file with R and T, or R1 R2 P1 P2 (extrinsics.
 type Names = &'static [&'static str];
 
 const CAMERAS: [Names; 2] = [
-    &["m1", "k1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "mleft", "leftk"],
-    &["m2", "k2", "cameramatrix2", "cameramatrixright", "rightcameramatrix", "kright", "mright", "rightk"],
+    &["m1", "k1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "mleft"],
+    &["m2", "k2", "cameramatrix2", "cameramatrixright", "rightcameramatrix", "kright", "mright"],
 ];
 const LENSES: [Names; 2] = [
-    &[
-        "d1",
-        "distcoeffs1",
-        "distcoeffsleft",
-        "leftdistcoeffs",
-        "distortioncoefficientsleft",
-        "distortionleft",
-        "dleft",
-        "leftd",
-    ],
+    &["d1", "distcoeffs1", "distcoeffsleft", "leftdistcoeffs", "distortioncoefficientsleft", "distortionleft", "dleft"],
     &[
         "d2",
         "distcoeffs2",
@@ -45,20 +35,17 @@ const LENSES: [Names; 2] = [
         "distortioncoefficientsright",
         "distortionright",
         "dright",
-        "rightd",
     ],
 ];
 const ROTATION: Names = &["r", "rotation", "rotationmatrix"];
 const TRANSLATION: Names = &["t", "translation", "translationvector"];
 /// R1 and R2, which rotate from each camera's axes to the rectified ones.
-const ROTATIONS: [Names; 2] =
-    [&["r1", "rectificationleft", "rleft", "leftr"], &["r2", "rectificationright", "rright", "rightr"]];
-const PROJECTIONS: [Names; 2] =
-    [&["p1", "projectionleft", "pleft", "leftp"], &["p2", "projectionright", "pright", "rightp"]];
+const ROTATIONS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
+const PROJECTIONS: [Names; 2] = [&["p1", "projectionleft", "pleft"], &["p2", "projectionright", "pright"]];
 const MODEL: Names = &["distortionmodel"];
 const SIZE: Names = &["imagesize", "size"];
-const WIDTH: Names = &["imagewidth", "width", "leftwidth"];
-const HEIGHT: Names = &["imageheight", "height", "leftheight"];
+const WIDTH: Names = &["imagewidth", "width"];
+const HEIGHT: Names = &["imageheight", "height"];
 
 fn find_entry<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
     let matches_key = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-', '.'], "").as_str());

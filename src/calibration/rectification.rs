@@ -96,7 +96,7 @@ impl Rectification {
     }
 
     /// Returns the direction of a pixel of a rectified picture (0 left, 1 right), in that camera's own axes.
-    pub fn pixel_direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
+    pub(super) fn pixel_direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
         let flat = (pixel_px - self.centers_px[side]) / self.focal_px;
         self.rotations[side].transpose() * flat.extend(1.0)
     }

@@ -36,7 +36,8 @@ pub(super) fn from_files(one: &File, other: &File) -> Result<StereoCalibration, 
     let cameras = [read_camera(left)?, read_camera(right)?];
     let rotations = [require_entry(left, ROTATION)?, require_entry(right, ROTATION)?];
     let projections = [require_entry(left, PROJECTION)?, require_entry(right, PROJECTION)?];
-    Ok(stored::from_rectification(cameras, stored::parse_rectification(rotations, projections)?))
+    let (given, shift) = stored::parse_rectification(rotations, projections)?;
+    Ok(stored::from_rectification(cameras, given, shift))
 }
 
 fn read_camera(file: &File) -> Result<CameraIntrinsics, CalibrationError> {

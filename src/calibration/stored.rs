@@ -65,7 +65,8 @@ pub(super) fn find_pose(given: &Rectification, shift: f64) -> (DMat3, DVec3) {
 /// Returns the calibration of `cameras` whose pose follows from their rectification, in a unit that is assumed.
 pub(super) fn from_rectification(
     cameras: [CameraIntrinsics; 2],
-    (given, shift): (Rectification, f64),
+    given: Rectification,
+    shift: f64,
 ) -> StereoCalibration {
     let unit = LengthUnit::assume(given.baseline_m);
     let (rotation, translation) = find_pose(&given, shift);

@@ -1,31 +1,16 @@
-//! The entries of a calibration file, whatever its syntax (YAML, JSON, XML or INI), with the line of each for error
-//! messages.
+//! The entries of a calibration file, whatever its syntax (YAML, JSON or INI), with the line of each for error messages.
 
 use std::path::{Path, PathBuf};
 
 use super::error::{CalibrationError, Fault};
-use super::{ini, xml, yaml};
+use super::yaml::{Kind, Node};
+use super::{ini, yaml};
 use crate::files::input;
-
-/// Maximum depth of nested lists and maps; calibrations need six.
-pub(super) const MAX_NESTING: usize = 32;
 
 /// A parsed file.
 pub(super) struct File {
     path: PathBuf,
     root: Node,
-}
-
-/// An entry and its line, from 1.
-pub(super) struct Node {
-    pub line: usize,
-    pub kind: Kind,
-}
-
-pub(super) enum Kind {
-    Scalar(String),
-    List(Vec<Node>),
-    Map(Vec<(String, Node)>),
 }
 
 /// A matrix of any size, row by row.
@@ -46,8 +31,10 @@ impl File {
     /// Parses `text`, the content of `path`, whose beginning shows its syntax.
     pub fn parse(path: &Path, text: &str) -> Result<Self, CalibrationError> {
         let text = text.trim_start_matches('\u{feff}');
+        if text.trim_start().starts_with('<') {
+            return Err(CalibrationError::Unconverted { path: path.to_owned(), format: "XML" });
+        }
         let (format, root) = match text {
-            xml if xml.trim_start().starts_with('<') => ("XML", xml::parse(xml)),
             ini if ini::is_ini(ini) => ("INI", ini::parse(ini)),
             // JSON is YAML, too.
             yaml => ("YAML", yaml::parse(yaml)),

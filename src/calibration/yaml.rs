@@ -2,7 +2,20 @@
 
 use saphyr_parser::{Event, Parser, ScanError};
 
-use super::tree::{Kind, MAX_NESTING, Node};
+/// Maximum depth of nested lists and maps; calibrations need six.
+const MAX_NESTING: usize = 32;
+
+/// An entry and its line, from 1.
+pub(super) struct Node {
+    pub line: usize,
+    pub kind: Kind,
+}
+
+pub(super) enum Kind {
+    Scalar(String),
+    List(Vec<Node>),
+    Map(Vec<(String, Node)>),
+}
 
 /// Parses the first document of `text`; an empty map without any. Fails with the line and the reason.
 pub(super) fn parse(text: &str) -> Result<Node, (usize, String)> {

@@ -138,7 +138,7 @@ mod tests {
         let limit = MemoryLimit::new(1 << 20);
         thread::spawn(|| {
             limit.apply();
-            for size in 1..10 {
+            for size in 1..5 {
                 let mut bytes = std::hint::black_box(vec![0u8; 70_000 * size]);
                 bytes.reserve(80_000 * size);
             }

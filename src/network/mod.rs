@@ -23,7 +23,7 @@ use crate::compute::catch_panic;
 /// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
 pub const MAX_BYTES: u64 = 200 << 20;
 /// Maximum number of values of an input or output: more than any picture that a network receives.
-pub const MAX_VALUES: usize = 4 << 20;
+const MAX_VALUES: usize = 4 << 20;
 
 /// An input or output of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]

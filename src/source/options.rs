@@ -157,7 +157,7 @@ pub struct Stereo {
     #[cfg_attr(feature = "clap", arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = parse_switch, hide_default_value = true))]
     pub rectified: bool,
-    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
+    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ZED or OAK-D to rectify the pictures,
     /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list
     /// with commas, for a calibration in two files
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", value_delimiter = ','))]

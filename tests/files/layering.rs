@@ -59,7 +59,7 @@ const DOORS: [(&str, &[&str]); 36] = [
         ],
     ),
     ("rfd", &["window/dialog"]),
-    ("roxmltree", &["calibration/xml", "recording/embedded", "recording/xmp"]),
+    ("roxmltree", &["recording/embedded", "recording/xmp"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
     ("ruzstd", &["recording/mcap"]),

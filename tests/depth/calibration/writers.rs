@@ -96,21 +96,6 @@ pub fn opencv_yaml(head: &str, colon: &str, unit_m: f64) -> String {
     format!("{head}\n---\n{}", matrices(unit_m).into_iter().map(write).collect::<String>())
 }
 
-fn opencv_xml() -> String {
-    let write = |(name, rows, cols, data): (&str, usize, usize, Vec<f64>)| {
-        let data = list(&data).replace(", ", "\n    ");
-        format!(
-            "<{name} type_id=\"opencv-matrix\">\n  <rows>{rows}</rows>\n  <cols>{cols}</cols>\n  <dt>d</dt>\n  \
-             <data>\n    {data}</data></{name}>\n"
-        )
-    };
-    let all: String = matrices(1.0).into_iter().map(write).collect();
-    format!(
-        "<?xml version=\"1.0\"?>\n<opencv_storage>\n<!-- two cameras -->\n{all}<size>\n  \
-         752 480</size>\n</opencv_storage>\n"
-    )
-}
-
 pub fn flat() -> String {
     let write = |(name, _, _, data): (&str, usize, usize, Vec<f64>)| format!("{name}: [{}]\n", list(&data));
     format!("image_width: 752\nimage_height: 480\n{}", matrices(1.0).into_iter().map(write).collect::<String>())
@@ -183,41 +168,6 @@ fn ros_message(side: usize) -> String {
     )
 }
 
-fn orbslam3() -> String {
-    let camera = |side: usize| {
-        let names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"];
-        let numbers = PINHOLES[side].into_iter().chain(LENSES[side]);
-        let write = |(name, number): (&str, f64)| format!("Camera{}.{name}: {number}\n", side + 1);
-        names.into_iter().zip(numbers).map(write).collect::<String>()
-    };
-    let body = rotation().transpose();
-    let left_from_right = pose(body, -(body * DVec3::from_array(TRANSLATION_M)));
-    format!(
-        "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"PinHole\"\n{}{}Camera.width: 752\nCamera.height: \
-         480\nViewer.PointSize:2\nStereo.T_c1_c2: !!opencv-matrix\n  rows: 4\n  cols: 4\n  dt: f\n  data: [{}]\n",
-        camera(0),
-        camera(1),
-        list(&left_from_right)
-    )
-}
-
-fn orbslam2() -> String {
-    let matrix = |name: &str, rows: usize, cols: usize, data: &[f64]| {
-        format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data:[{}]\n", list(data))
-    };
-    let camera = |side: usize, name: &str| {
-        [
-            format!("{name}.height: 480\n{name}.width: 752\n"),
-            matrix(&format!("{name}.D"), 1, 4, &LENSES[side]),
-            matrix(&format!("{name}.K"), 3, 3, &camera_matrix(side)),
-            matrix(&format!("{name}.R"), 3, 3, &RECTIFIED[side]),
-            matrix(&format!("{name}.P"), 3, 4, &projection(side)),
-        ]
-        .concat()
-    };
-    format!("%YAML:1.0\n\nCamera.fx: {FOCAL_PX}\nCamera.bf: 48.02\n{}{}", camera(0, "LEFT"), camera(1, "RIGHT"))
-}
-
 /// Writes OAK's JSON of three cameras; the colour camera, socket 0, is `via` or beside the path from left to right.
 pub fn oak(via: bool) -> String {
     let (turn, place) = (rotation(), DVec3::from_array(TRANSLATION_M));
@@ -280,10 +230,8 @@ pub fn all() -> Vec<(&'static str, Vec<String>)> {
         ("YAML 1.2", one(opencv_yaml("%YAML 1.2", ": ", 1.0))),
         ("YAML:1.0 in mm", one(opencv_yaml("%YAML:1.0", ": ", 1e-3))),
         ("YAML without spaces", one(opencv_yaml("%YAML:1.0", ":", 1.0))),
-        ("XML", one(opencv_xml())),
-        ("XML, Windows", one(format!("\u{feff}{}", opencv_xml().replace('\n', "\r\n")))),
-        ("XML, one line", one(opencv_xml().replace("\n    ", " ").replace('\n', ""))),
         ("flat", one(flat())),
+        ("flat, Windows", one(format!("\u{feff}{}", flat().replace('\n', "\r\n")))),
         ("Kalibr, flat", one(kalibr_flat())),
         ("Kalibr with IMU", one(kalibr_imu())),
         ("EuRoC, flat", euroc_flat().to_vec()),
@@ -294,9 +242,6 @@ pub fn all() -> Vec<(&'static str, Vec<String>)> {
             "ROS 2 messages",
             [0, 1].map(|side| ros_message(side).replace("\nD:", "\nd:").replace("\nK:", "\nk:")).to_vec(),
         ),
-        ("ORB_SLAM2", one(orbslam2())),
-        ("ORB_SLAM3", one(orbslam3())),
-        ("ORB_SLAM3, old", one(orbslam3().replace("Camera1.", "Camera.").replace("Stereo.T_c1_c2", "Tlr"))),
         ("OAK", one(oak(false))),
         ("OAK over the colour camera", one(oak(true))),
         (

@@ -58,7 +58,7 @@ pub struct DepthCommand {
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
           value_parser = whole_number_parser(1..=Settings::MAX_DISPARITIES))]
     max_disparity: Option<u32>,
-    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, ZED or OAK-D to rectify the pictures,
+    /// Calibration of the two cameras, of OpenCV, ROS, Kalibr, EuRoC, ZED or OAK-D to rectify the pictures,
     /// or the calib.txt of a rectified pair of Middlebury, ETH3D or KITTI; may be given more than once, or as a list
     /// with commas, for a calibration in two files
     #[arg(id = "pair_calib", long = "calib", value_name = "FILE", value_delimiter = ',')]
