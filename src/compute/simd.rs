@@ -1,8 +1,8 @@
 //! SIMD dispatch: run-time choice of the vector instructions.
 //!
-//! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512, AVX2 with FMA, NEON, or the target's
-//! baseline), of which the best one available runs. Simple loops are vectorised by the compiler; the filters use
-//! explicit vectors.
+//! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512 with the feature `avx512`, AVX2 with
+//! FMA, NEON, or the target's baseline), of which the best one available runs. Simple loops are vectorised by the
+//! compiler; the filters use explicit vectors.
 
 use pulp::{Arch, Simd};
 
@@ -41,7 +41,7 @@ pub fn abs<S: Simd>(simd: S, values: S::f32s) -> S::f32s {
 /// Returns the name of the instruction set, for the report.
 pub fn instruction_set(arch: Arch) -> &'static str {
     match arch {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
         Arch::V4(_) => "AVX-512",
         #[cfg(target_arch = "x86_64")]
         Arch::V3(_) => "AVX2",

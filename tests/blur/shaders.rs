@@ -10,7 +10,8 @@ use bokehcam::compute::device::Shader;
 use bokehcam::depth::matting::gpu::shaders as matte;
 use bokehcam::depth::refine::gpu::shaders as refine;
 use bokehcam::depth::stereo::gpu::shaders as stereo;
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use wgpu::naga;
+use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
 fn parse(source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)))

@@ -8,6 +8,10 @@
 // Internal to the program: public items are documented only where their names do not suffice.
 #![allow(missing_docs)]
 
+/// For tests and benches, which speak of its keys and events.
+#[doc(hidden)]
+pub use egui;
+
 mod dialog;
 pub mod keys;
 pub mod panel;

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use bokehcam::frame::ColorImage;
 use bokehcam::look::Look;
+use bokehcam_window::egui::{self, Event, Pos2, RawInput, Rect, pos2, vec2};
 use bokehcam_window::panel::{Canvas, Panel};
 use bokehcam_window::present::soft::Painter;
 use bokehcam_window::present::{Area, Controls, Drawing, Image};
 use bokehcam_window::state::State;
-use egui::{Event, Pos2, RawInput, Rect, pos2, vec2};
 
 const SIZE: (u32, u32) = (1280, 720);
 const FRAMES: usize = 60;

@@ -52,6 +52,7 @@ pub struct Cli {
 /// Returns the version, and on a second line the parts that were built in, which scripts/package reads.
 fn describe_build() -> String {
     let parts = [
+        ("avx512", cfg!(feature = "avx512")),
         ("camera", cfg!(feature = "camera")),
         ("desktop", cfg!(feature = "desktop")),
         ("gpu", cfg!(feature = "gpu")),

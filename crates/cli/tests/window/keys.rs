@@ -3,8 +3,8 @@
 use std::thread;
 use std::time::Duration;
 
+use bokehcam_window::egui::Key;
 use bokehcam_window::keys::{Chord, GROUPS};
-use egui::Key;
 
 use super::input::sym;
 use super::picture::{distance, is_photograph};

@@ -3,7 +3,8 @@
 use std::mem::offset_of;
 
 use bokehcam_window::present::gpu::{PRESENT, WindowUniform};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use wgpu::naga;
+use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
 #[test]
 fn what_draws_the_window_validates_and_takes_what_rust_gives_it() {

@@ -105,11 +105,11 @@ fn a_package_takes_the_program_that_is_there() {
         assert_ne!(said.contains("cargo builds"), said.contains("takes target/release/bokehcam"), "{said}");
         said.contains("cargo builds")
     };
-    let all = "camera, desktop, gpu, lab, networks, pipewire, window";
+    let all = "avx512, camera, desktop, gpu, lab, networks, pipewire, window";
     built_with(all);
     assert!(!package(&[]), "it is up to date");
     assert!(package(&["--profile", "release"]), "this asks for a build");
-    built_with("camera, desktop, gpu, lab, networks, window");
+    built_with("avx512, camera, desktop, gpu, lab, networks, window");
     assert!(package(&[]), "a part is missing");
     built_with(all);
     let later = std::time::SystemTime::now() + std::time::Duration::from_secs(60);
