@@ -3,10 +3,13 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "gpu")]
 #[path = "../common/on_gpu.rs"]
 mod on_gpu;
 #[path = "../common/portrait.rs"]
 mod portrait;
+#[path = "../common/room.rs"]
+mod room;
 
 mod background;
 mod calibration;
@@ -15,6 +18,7 @@ mod matcher;
 mod matte_gpu;
 mod matting;
 mod pair_check;
+mod plate;
 mod rectify_gpu;
 mod refine;
 mod refine_gpu;

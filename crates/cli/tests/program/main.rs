@@ -9,6 +9,9 @@ mod onnx;
 mod planes;
 #[path = "../common/program.rs"]
 mod program;
+#[path = "../../../../tests/common/room.rs"]
+mod room;
+#[cfg(feature = "window")]
 #[path = "../../../../tests/common/store.rs"]
 mod store;
 
@@ -22,6 +25,8 @@ mod damage;
 #[cfg(feature = "gpu")]
 mod depth_on_gpu;
 mod disparity;
+// Its commands take every part that packages bring.
+#[cfg(feature = "packaged")]
 mod documents;
 mod fit;
 #[cfg(feature = "camera")]

@@ -142,7 +142,11 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
         (
             &["record", "demo", "--to", "r", "--keep-going"],
             2,
-            "--keep-going of `record`: it is for `preview`, `stream`",
+            if cfg!(feature = "window") {
+                "--keep-going of `record`: it is for `preview`, `stream`"
+            } else {
+                "--keep-going of `record`: it is for `stream`"
+            },
         ),
         (&["render", "photo.png", "--background", "w.jpg"], 2, "did you mean --behind?"),
         (&["render", "photo.png", "--blurr", "3"], 2, "no option --blurr of `render`, did you mean --blur?"),
