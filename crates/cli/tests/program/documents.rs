@@ -19,7 +19,7 @@ const LEFT_OUT: [(&str, &str); 19] = [
     ("sudo ", "needs root"),
     ("systemctl ", "needs a session, and starts something in it"),
     ("journalctl ", "needs a session"),
-    ("gst-", "needs GStreamer: gst/test follows it"),
+    ("gst-", "needs GStreamer: gst/tests follows it"),
     ("GST_PLUGIN_PATH", "needs GStreamer"),
     ("cargo ", "builds"),
     ("pip install", "needs a network"),
