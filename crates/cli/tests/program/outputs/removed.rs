@@ -13,7 +13,8 @@ fn run(home: &Home, path: &str, name: &str) -> (Beside, BufReader<ChildStderr>) 
     let mut run = home.start(path, &args);
     let stderr = BufReader::new(run.0.stderr.take().unwrap());
     until("pictures", || {
-        home.path("out/000001.png").exists()
+        // The first ones may still be in an encoder.
+        home.path("out/000012.png").exists()
             && part(&home.path("d")).is_some_and(|part| part.metadata().unwrap().len() > 0)
     });
     (run, stderr)
