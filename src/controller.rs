@@ -5,33 +5,26 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::control::{Answer, Handler, Name, Request, Status};
-use crate::look::{Look, Patch};
+use crate::look::{Change, Look, LookError, Patch};
 use crate::sink::ShutterControl;
-use crate::source::{DepthChoice, DepthOrigin, Kind};
+use crate::source::{DepthOrigin, Kind};
 
-/// Interprets requests according to the run's command line. A refusal is returned as the answer.
-#[allow(clippy::missing_errors_doc)]
-pub trait Rules: Send + Sync {
-    /// Parses settings, each written `NAME=VALUE`, into changes.
-    fn parse_settings(&self, settings: &[String]) -> Result<Patch, Answer>;
-
-    /// Returns the current changes of a preset.
-    fn load_preset(&self, name: &str) -> Result<Patch, Answer>;
-
-    /// Returns the look after a change, and one line on the parts of the change without effect.
-    fn apply_patch(&self, patch: &Patch, look: &Look, facts: &SourceFacts) -> Result<(Look, Option<String>), Answer>;
+/// What the command line of a run adds to the rules of looks. A refusal is returned as the answer.
+pub struct CommandLine {
+    /// Returns the current settings of a preset.
+    pub load_preset: Box<dyn Fn(&str) -> Result<Patch, Answer> + Send + Sync>,
+    /// Returns one line on the settings that have no effect in the run.
+    pub describe_unused: Box<dyn Fn(&Patch, &Changed) -> Option<String> + Send + Sync>,
 }
 
-/// The facts of a source that decide which looks are possible.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SourceFacts {
-    pub kind: Kind,
-    /// Width and height of its pictures, in pixels.
-    pub size: (u32, u32),
-    /// Whether its frames have depth; `depth_from` says from where.
-    pub has_depth: bool,
-    pub depth_from: DepthOrigin,
-    pub depth_choice: DepthChoice,
+/// The result of a change of the look.
+pub struct Changed {
+    /// The look after it.
+    pub look: Look,
+    /// What of the change is left out.
+    pub note: Option<String>,
+    /// The kind of the source and the origin of its depth, while one is open.
+    pub source: Option<(Kind, DepthOrigin)>,
 }
 
 /// A run that can be controlled, from several threads at once. A refusal is returned as the answer.
@@ -46,8 +39,8 @@ pub trait ControllableRun: Send + Sync {
     /// Returns the control of the shutter before the outputs, while there are outputs.
     fn shutter(&self) -> Option<ShutterControl>;
 
-    /// Changes the look as far as the rules allow; returns their note.
-    fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer>;
+    /// Changes the look as far as [`Look::change`] allows.
+    fn change_look(&self, change: Change) -> Result<Changed, Answer>;
 
     /// Switches to another source of depth.
     fn set_depth_source(&self, way: &str) -> Result<(), Answer>;
@@ -56,35 +49,55 @@ pub trait ControllableRun: Send + Sync {
     fn save_snapshot(&self, to: Option<&Path>) -> Result<PathBuf, Answer>;
 }
 
+/// Returns the answer to a look that cannot be.
+pub fn refuse_look(error: &LookError) -> Answer {
+    match error.is_wrong_argument() {
+        true => Answer::invalid_request(error.to_string()),
+        false => Answer::failed(error.to_string()),
+    }
+}
+
 /// Answers requests to a run.
 pub struct Controller<R> {
     name: Name,
     command: &'static str,
     began: Instant,
-    rules: Arc<dyn Rules>,
+    command_line: CommandLine,
     run: R,
 }
 
 impl<R: ControllableRun + 'static> Controller<R> {
     /// Creates the handler for a run with this name that starts now.
-    pub fn create_handler(name: Name, command: &'static str, rules: Arc<dyn Rules>, run: R) -> Arc<Handler> {
-        let controller = Self { name, command, began: Instant::now(), rules, run };
+    pub fn create_handler(name: Name, command: &'static str, command_line: CommandLine, run: R) -> Arc<Handler> {
+        let controller = Self { name, command, began: Instant::now(), command_line, run };
         Arc::new(move |request| controller.handle_request(request).unwrap_or_else(|refused| refused))
     }
 
     fn handle_request(&self, request: Request) -> Result<Answer, Answer> {
-        let change = |patch| self.run.change_look(patch, &self.rules);
         let note = match request {
             Request::Status => None,
             Request::On => self.switch_and_wait(Some(true))?,
             Request::Off => self.switch_and_wait(Some(false))?,
             Request::Toggle => self.switch_and_wait(None)?,
-            Request::Preset { name } => change(self.rules.load_preset(&name)?)?,
-            Request::Set { settings } => change(self.rules.parse_settings(&settings)?)?,
+            Request::Preset { name } => self.change_look(Change::to_preset((self.command_line.load_preset)(&name)?))?,
+            Request::Set { settings } => {
+                let mut patch = Patch::parse_assignments(&settings).map_err(Answer::invalid_request)?;
+                patch.load_pictures().map_err(|error| refuse_look(&error))?;
+                self.change_look(Change::to_settings(patch))?
+            }
             Request::Depth { from } => self.run.set_depth_source(&from).map(|()| None)?,
             Request::Snapshot { to } => return self.handle_snapshot(to.as_deref()),
         };
         Ok(Answer::Done { status: Box::new(self.status()?), note })
+    }
+
+    /// Changes the look. Returns one line on what of the change is left out, or has no effect.
+    fn change_look(&self, change: Change) -> Result<Option<String>, Answer> {
+        let patch = change.patch.clone();
+        let changed = self.run.change_look(change)?;
+        let unused = (self.command_line.describe_unused)(&patch, &changed);
+        let lines: Vec<String> = changed.note.into_iter().chain(unused).collect();
+        Ok(Some(lines.join("; ")).filter(|line| !line.is_empty()))
     }
 
     /// Switches pictures on or off. After switching off, returns only once every output that may have viewers shows the

@@ -6,9 +6,8 @@ use std::sync::Mutex;
 use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
-use bokehcam::look::{Look, Refine, SourceDepth};
+use bokehcam::look::{Change, Look, LookFacts, Metres, Refine};
 use bokehcam::recording::still::check_depth_size;
-use bokehcam::source::{DepthChoice, adapt_look};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 
@@ -44,8 +43,8 @@ impl Still {
         if let Some(Aperture { shape, rim }) = aperture {
             (look.aperture, look.rim) = (shape.clone(), *rim);
         }
-        let look = adapt_look(&look, &DepthChoice::Auto, SourceDepth { has_depth, ..SourceDepth::default() })
-            .map_err(errors::value)?;
+        let facts = LookFacts { has_depth, metres: Metres::Known, size, ..LookFacts::default() };
+        let (look, _) = look.change(&Change::default(), &facts).map_err(errors::value)?;
         let executor = look.blur_settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
         let executor = py.detach(|| executor.transpose()).map_err(errors::value)?.map(Mutex::new);
         Ok(Self { look, threads, executor })

@@ -7,6 +7,8 @@
 mod aperture;
 #[cfg(feature = "files")]
 mod background;
+#[cfg(feature = "files")]
+mod change;
 mod coc;
 mod effect;
 mod follow;
@@ -25,14 +27,16 @@ mod tilt;
 pub use aperture::ApertureSetting;
 #[cfg(feature = "files")]
 pub use background::BackgroundSetting;
+#[cfg(feature = "files")]
+pub use change::{Change, LookError};
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine, Reuse};
 pub use follow::FramingZoom;
 #[cfg(feature = "files")]
-pub use patch::{LookError, Value};
+pub use patch::Value;
 #[cfg(feature = "files")]
 pub use settings::{Patch, SETTINGS};
-pub use source_depth::SourceDepth;
+pub use source_depth::{LookFacts, Metres};
 pub use strength::Strength;
 pub use tilt::Tilt;
 
@@ -141,17 +145,6 @@ impl Look {
             Effect::Blur => Some(CocKind::Uniform),
             Effect::TiltShift => Some(CocKind::Ramp),
             Effect::Auto | Effect::Dof => Some(CocKind::Depth),
-        }
-    }
-
-    /// Returns a setting that needs depth in metres, as a flag, for the message that depth is only relative; `None` if
-    /// the look has no such setting.
-    pub fn metric_setting(&self) -> Option<String> {
-        match (self.focus, self.strength) {
-            (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
-            _ if self.focus_range_m > 0.0 => Some(format!("--focus-range {}", self.focus_range_m)),
-            (_, Strength::Lens(lens)) => Some(format!("--f-number {}", lens.f_number)),
-            _ => None,
         }
     }
 

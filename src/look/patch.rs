@@ -6,25 +6,22 @@ use std::path::PathBuf;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::settings::{SETTINGS, Setting, find_setting};
-use super::{ApertureSetting, BackgroundSetting, Look, Patch, Strength};
+use super::{ApertureSetting, BackgroundSetting, Look, LookError, Patch, Strength};
 use crate::bokeh::aperture::Shape;
 use crate::depth::backdrop::Background;
+use crate::names::find_similar;
 use crate::optics::Lens;
-use crate::recording::RecordingError;
-use crate::video::VideoError;
 
-/// An error in the settings of a look.
-#[derive(Debug, thiserror::Error)]
-pub enum LookError {
-    /// A lens lacks one of its numbers.
-    #[error("a lens needs all of --f-number, --focal-length and --sensor-width")]
-    Lens,
-    /// A picture cannot be read.
-    #[error(transparent)]
-    Picture(#[from] RecordingError),
-    /// A video behind the subject cannot be read.
-    #[error("--behind: {0}")]
-    Video(#[from] VideoError),
+/// Explains why a look has no setting of this name, and the remedy.
+fn describe_unknown(name: &str, value: &str) -> String {
+    if name == "preset" {
+        return format!("a preset is taken by `bokehcam ctl preset {value}`");
+    }
+    let remedy = match find_similar(name, SETTINGS.iter().map(|setting| setting.name)) {
+        Some(near) => format!(", did you mean {near}?"),
+        None => ": nothing else can be changed while it runs".to_owned(),
+    };
+    format!("there is no setting '{name}' of the look{remedy}")
 }
 
 impl Patch {
@@ -68,6 +65,34 @@ impl Patch {
         for (name, text) in settings {
             let found = find_setting(name).ok_or_else(|| "it is not a setting of the look".to_string());
             found.and_then(|setting| setting.parse_into(&mut patch, text)).map_err(|what| (name.to_string(), what))?;
+        }
+        Ok(patch)
+    }
+
+    /// Parses settings, each written `NAME=VALUE`, as strictly as the command line.
+    ///
+    /// # Errors
+    /// Returns a line on a name that is no setting of a look, an invalid value, or settings that are repeated or exclude
+    /// each other.
+    pub fn parse_assignments(settings: &[String]) -> Result<Self, String> {
+        let (mut patch, mut given) = (Self::default(), Vec::<&Setting>::new());
+        for text in settings {
+            let (name, value) = text
+                .split_once('=')
+                .filter(|(name, _)| !name.is_empty())
+                .ok_or_else(|| format!("'{text}': write NAME=VALUE, such as blur=3% or focus=auto"))?;
+            let name = name.trim_start_matches('-');
+            let setting = find_setting(name).ok_or_else(|| describe_unknown(name, value))?;
+            let flag = |setting: &Setting| format!("'--{} <{}>'", setting.name, setting.value);
+            if given.iter().any(|other| other.name == setting.name) {
+                return Err(format!("the argument {} cannot be used multiple times", flag(setting)));
+            }
+            if let Some(other) = given.iter().find(|other| other.excluded_settings().contains(&setting.name)) {
+                return Err(format!("the argument {} cannot be used with {}", flag(setting), flag(other)));
+            }
+            let parsed = setting.parse_into(&mut patch, value);
+            parsed.map_err(|what| format!("invalid value '{value}' for {}: {what}", flag(setting)))?;
+            given.push(setting);
         }
         Ok(patch)
     }
@@ -234,6 +259,35 @@ mod tests {
         assert_eq!("0.6".parse(), Ok(Tilt { center_y: 0.6, band: 0.15, angle_deg: 0.0 }));
         assert_eq!(Patch::parse([("rim", "2")]), Err(("rim".to_string(), "use a number from 0 to 1".to_string())));
         assert!(Patch::parse([("mirror", "true")]).is_err());
+    }
+
+    #[test]
+    fn assignments_are_those_of_the_command_line() {
+        let parse = |settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+            Patch::parse_assignments(&settings).map(|patch| patch.values())
+        };
+        let text = |value: &str| value.to_string();
+        let values = parse(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
+        assert_eq!(values, [("focus", text("auto")), ("blur", text("3%")), ("quality", text("fast"))]);
+        for (bad, said) in [
+            (&["rim"][..], "write NAME=VALUE"),
+            (&["=3"], "write NAME=VALUE"),
+            (&["rim=2"], "invalid value '2' for '--rim <W>': use a number from 0 to 1"),
+            (&["rimm=1"], "there is no setting 'rimm' of the look, did you mean rim?"),
+            (&["blurr=3%"], "there is no setting 'blurr' of the look, did you mean blur?"),
+            (&["zzz=3"], "there is no setting 'zzz' of the look: nothing else can be changed while it runs"),
+            (&["preset=dreamy"], "`bokehcam ctl preset dreamy`"),
+            (&["depth=matte"], "nothing else can be changed while it runs"),
+            (&["coc-at-infinity=3", "blur=3"], "cannot be used multiple times"),
+            (&["mirror=true"], "nothing else can be changed while it runs"),
+            (&["effect=big"], "invalid value 'big' for '--effect <WHAT>': use auto, dof"),
+            (&["blur=3%", "f-number=2"], "'--f-number <N>' cannot be used with '--blur <PX>'"),
+            (&["rim=0.1", "rim=0.2"], "cannot be used multiple times"),
+        ] {
+            let refused = parse(bad).unwrap_err();
+            assert!(refused.contains(said) && !refused.contains('\n'), "{bad:?}: {refused}");
+        }
     }
 
     #[test]

@@ -161,7 +161,7 @@ pub fn resolve_alias(called: &str) -> &str {
 }
 
 /// The settings of a lens, which exclude the strength at infinity.
-const LENS_SETTINGS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
+pub(super) const LENS_SETTINGS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
 /// The strength at infinity, which excludes the settings of a lens.
 const COC_AT_INFINITY: &str = "blur";
 /// Setting names and their aliases, valid wherever settings are written.
@@ -190,6 +190,11 @@ impl Setting {
     /// Returns its default value; `None` if that is [computed](Setting::computed).
     pub fn default(&self) -> Option<String> {
         (self.get)(&Patch::from_look(&Look::default())).filter(|_| !self.computed)
+    }
+
+    /// Removes it from a patch.
+    pub fn clear_in(&self, patch: &mut Patch) {
+        (self.clear)(patch);
     }
 
     /// Parses a value into a patch.

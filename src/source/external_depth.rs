@@ -46,12 +46,10 @@ pub(super) fn add_external_depth(
         DepthChoice::Folder(folder) => {
             let recording = registration::open_recording(folder, true, request.options)?;
             let depth_from = recorded_depth_origin(&recording);
-            request.check_relative_depth(depth_from)?;
             first_depth = request.read_first_depth(&recording);
             (Box::new(LoopedRecording::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Video(file) => {
-            request.check_relative_depth(DepthOrigin::Relative)?;
             (Box::new(video::open_depth(file, transform.own_px, name, depth)?), DepthOrigin::Relative)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
@@ -91,8 +89,7 @@ fn add_map_sequence(
     };
     let played = last_played_frame(&request.options.frames, source.camera.info().period_ns);
     let (maps, notes) = MapSequence::open(folder, pictured, played, request.options.depth.of_photo())?;
-    let depth_from = maps.distances().into();
-    request.check_relative_depth(depth_from)?;
+    let depth_from = DepthOrigin::from(maps.distances());
     source.findings.notes.extend(notes);
     let size = source.camera.info().size;
     let registration =

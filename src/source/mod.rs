@@ -12,7 +12,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod adaptation;
 pub mod calib;
 mod containers;
 pub mod devices;
@@ -33,7 +32,6 @@ mod stereo;
 mod suggestion;
 pub mod video;
 
-pub use adaptation::{adapt_look, reject_metric_look};
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
 pub use networks::{find_person, installed_networks};
@@ -52,7 +50,7 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
-use crate::look::{Look, SourceDepth};
+use crate::look::{Look, LookFacts, Metres};
 use crate::optics::StereoRig;
 use crate::pipeline::{BlurSetup, Destination, Run};
 use crate::recording::{DepthUnit, Options as Reading, Recording, Scratch};
@@ -81,6 +79,11 @@ impl DepthOrigin {
     /// Returns whether distances are relative, not in metres.
     pub fn is_relative(self) -> bool {
         matches!(self, Self::Relative | Self::Networks | Self::Plate)
+    }
+
+    /// Returns what its distances mean.
+    pub fn metres(self) -> Metres {
+        if self.is_relative() { Metres::Missing } else { Metres::Known }
     }
 
     /// Returns whether another origin may replace it: there is no depth, or it is inferred from the pictures alone.
@@ -158,9 +161,6 @@ struct OpenRequest<'a> {
     /// The picture of a photo, if it is decoded already.
     photo: Option<Arc<ColorImage>>,
 }
-
-/// Part of the message that rejects metres for relative inverse depth.
-pub const INVERSE_DEPTH_GIVES: &str = "inverse depth without a scale gives";
 
 /// Whether stereo depth is refined by default: refinement does not model the errors of stereo matching, but makes its
 /// depth steadier.
@@ -244,9 +244,6 @@ impl Source {
         } else if request.uses_stereo(source.depth.is_some()) {
             let depth = stereo::open_stereo(&info, &source.pair, source.disparities, stereo, computing)?;
             let rig = *depth.rig();
-            if let Some(look) = request.look {
-                stereo::check_focus(&rig, look)?;
-            }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
             let depth_from = DepthOrigin::Stereo;
             return Ok(Self { rig: Some(rig), depth_from, ..Self::from_camera(source.camera, depth) });
@@ -260,14 +257,20 @@ impl Source {
         self.depth.is_some() || self.camera.info().frame_data == FrameData::Depth
     }
 
-    /// Adapts a look to this source, which was opened with `options`.
+    /// Returns what its distances mean.
+    pub fn metres(&self) -> Metres {
+        let is_assumed = self.rig.is_some_and(|rig| !rig.metric);
+        if is_assumed { Metres::Assumed } else { self.depth_from.metres() }
+    }
+
+    /// Returns what this source, which was opened with `options`, allows a look. Nothing is known about outputs.
     ///
     /// # Errors
-    /// Same as for [`adapt_look`].
-    pub fn adapt_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
-        let focus = self.findings.focus.filter(|_| look.focus == FocusRule::Auto).unwrap_or(look.focus);
-        let (has_depth, is_relative, size) = (self.has_depth(), self.depth_from.is_relative(), self.camera.info().size);
-        adapt_look(&Look { focus, ..look.clone() }, &options.depth_choice, SourceDepth { has_depth, is_relative, size })
+    /// The options want depth that the source lacks.
+    pub fn look_facts(&self, options: &Options) -> Result<LookFacts, SourceError> {
+        let mut facts = options.depth_choice.look_facts(self.has_depth(), self.metres())?;
+        facts.size = self.camera.info().size;
+        Ok(facts)
     }
 
     /// Returns whether its depth is measured (not computed exactly), so that refinement improves it. The depth of a photo
@@ -317,12 +320,6 @@ impl OpenRequest<'_> {
         let is_used = self.look.is_some_and(|look| look.effect.follows_depth()) && recording.has_depth();
         let read = is_used.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
         read.ok().map(|()| map)
-    }
-
-    /// Rejects a look that needs real distances if depth is relative.
-    fn check_relative_depth(&self, depth_from: DepthOrigin) -> Result<(), SourceError> {
-        let is_used = depth_from == DepthOrigin::Relative && self.uses_depth();
-        self.look.filter(|_| is_used).map_or(Ok(()), |look| reject_metric_look(look, INVERSE_DEPTH_GIVES))
     }
 
     fn check_effect(&self) -> Result<(), SourceError> {

@@ -66,7 +66,7 @@ pub fn installed_networks() -> SingleCameraDepth {
 #[cfg(feature = "networks")]
 pub(super) fn add_network_depth(source: Source, request: &OpenRequest) -> Source {
     let is_lone = !source.has_depth() && request.options.depth_choice == DepthChoice::Auto;
-    let needs_metres = request.look.is_some_and(|look| look.metric_setting().is_some());
+    let needs_metres = request.look.is_some_and(Look::needs_metres);
     // A source without a look is being recorded: record only what cannot be computed later.
     if !is_lone || needs_metres || !request.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;

@@ -87,7 +87,6 @@ impl Opened {
                 }
                 let disparities = recording.disparity_count();
                 let depth_from = recorded_depth_origin(&recording);
-                request.check_relative_depth(depth_from)?;
                 let first_depth = request.read_first_depth(&recording);
                 let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
                 let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
@@ -108,7 +107,6 @@ impl Opened {
             }
             SourceName::Photo(path) => {
                 let photo::ReadPhoto { color, depth, depth_from, mut findings } = photo::read_photo(path, request)?;
-                request.check_relative_depth(depth_from)?;
                 let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
                 findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());
                 let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);

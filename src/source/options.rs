@@ -12,11 +12,12 @@ use std::str::FromStr;
 #[cfg(feature = "clap")]
 use clap::Args;
 
-use super::video::is_video;
+use super::{SourceError, video::is_video};
 #[cfg(feature = "clap")]
 use crate::depth::stereo::Settings;
 #[cfg(feature = "clap")]
 use crate::look::number::{in_range_parser, parse_count, parse_positive, parse_switch, whole_number_parser};
+use crate::look::{LookFacts, Metres};
 #[cfg(feature = "clap")]
 use crate::names;
 use crate::recording::depth_file::{self, Fit};
@@ -206,6 +207,18 @@ impl DepthChoice {
     /// Returns whether the depth is not the source's own.
     pub fn is_external(&self) -> bool {
         matches!(self, Self::Folder(_) | Self::Video(_) | Self::Device(_) | Self::SingleCamera(_) | Self::Defocus)
+    }
+
+    /// Returns what depth that is there or not allows a look.
+    ///
+    /// # Errors
+    /// The source's own depth is wanted, and it has none.
+    pub fn look_facts(&self, has_depth: bool, metres: Metres) -> Result<LookFacts, SourceError> {
+        if *self == Self::Recorded && !has_depth {
+            return SourceError::usage_error("--depth recorded: the source has no depth");
+        }
+        let is_declined = has_depth && *self == Self::None;
+        Ok(LookFacts { has_depth: has_depth && !is_declined, is_declined, metres, ..LookFacts::default() })
     }
 
     /// Returns whether it is a file for each frame, or a frame of a video: frames are then counted.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::{
     DepthOrigin, OpenRequest, Options, PlateFile, SingleCameraDepth, Source, SourceError, SourceName, networks,
-    reject_metric_look,
 };
 use crate::depth::plate::{CameraLock, Guide, PlateDepth, Step};
 use crate::depth::{DepthError, DepthSource, FrameInput};
@@ -16,15 +15,14 @@ use crate::recording::still;
 /// Adds the depth of `chosen` to `source`.
 ///
 /// # Errors
-/// A file is unreadable or of another size, the source is not live, so that no plate can be taken, a network cannot be
-/// used, or the look needs real distances.
+/// A file is unreadable or of another size, the source is not live, so that no plate can be taken, or a network cannot be
+/// used.
 pub(super) fn add_depth(
     source: Source,
     chosen: &SingleCameraDepth,
     name: &SourceName,
     request: &OpenRequest,
 ) -> Result<Source, SourceError> {
-    request.look.map_or(Ok(()), |look| reject_metric_look(look, "one camera gives"))?;
     let info = source.camera.info();
     let networks = chosen.has_networks().then(|| networks::open_networks(chosen, request)).transpose()?;
     let (companion, about) = networks.unzip();
@@ -59,7 +57,6 @@ pub fn compute_picture_depth(
     look: &Look,
     color: &ColorImage,
 ) -> Result<DepthMap, SourceError> {
-    reject_metric_look(look, "one picture gives")?;
     let request = OpenRequest { options, look: Some(look), photo: None };
     let seen = FrameInput { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None };
     let networks = chosen

@@ -10,7 +10,6 @@ use crate::capture::SourceInfo;
 use crate::computing::ComputeOptions;
 use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
-use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::StereoGeometry;
 
@@ -144,18 +143,6 @@ pub fn open_stereo(
         true => depth,
         false => depth.with_wider_matcher(move |disparities| computing.create_matcher(disparities, Effort::Full, size)),
     })
-}
-
-/// Rejects a look that needs metres if the geometry is only assumed.
-///
-/// # Errors
-/// The focus or the lens needs metres, and `rig` has none.
-pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
-    let Some(needs) = look.metric_setting().filter(|_| !rig.metric) else { return Ok(()) };
-    Err(SourceError::Usage(format!(
-        "{needs} needs distances, which this stereo pair does not give: add --calib FILE, or --focal-px and \
-         --baseline-m; or use --focus auto or X,Y, and --blur"
-    )))
 }
 
 /// Returns the number of disparities to search: the known number, or else a tenth of the picture's width.

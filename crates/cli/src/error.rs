@@ -164,14 +164,15 @@ impl CliError {
 
     /// Whether the command line is at fault.
     pub fn is_wrong_argument(&self) -> bool {
-        if let CliError::Source(error) = self {
-            return error.is_wrong_argument();
+        match self {
+            CliError::Source(error) => return error.is_wrong_argument(),
+            CliError::Look(error) => return error.is_wrong_argument(),
+            _ => {}
         }
         matches!(
             self,
             CliError::Usage(_)
                 | CliError::Settings { .. }
-                | CliError::Look(LookError::Lens)
                 | CliError::Bokeh(BokehError::TooWide { .. } | BokehError::Transparent)
         )
     }

@@ -14,8 +14,7 @@ use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::camera_control::CameraControl;
 use bokehcam::capture::demo;
 use bokehcam::computing::ExecutorFactory;
-use bokehcam::depth::focus::FocusRule;
-use bokehcam::look::{Effect, Look, Strength};
+use bokehcam::look::{Effect, Look};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::sink::{self, Sink, Target};
 use bokehcam::source::devices::{self, CameraWatch, Choice};
@@ -84,18 +83,18 @@ impl System {
 
     /// Returns the properties of the opened source.
     fn camera_properties(&self, source: &Source, name: &SourceName) -> Camera {
-        let is_relative = source.depth_from.is_relative();
+        let metres = source.metres();
         let is_lone = source.depth_from.is_replaceable();
         let Some(camera) = &self.camera else {
             // A camera known only to PipeWire is a laptop's built-in one.
             let faces_user = is_lone && name.kind() == Kind::Camera;
-            return Camera { is_relative, faces_user, is_fallback: self.is_fallback, ..Camera::default() };
+            return Camera { metres, faces_user, is_fallback: self.is_fallback, ..Camera::default() };
         };
         let is_pair = self.options.stereo.side_by_side;
         Camera {
             modes: modes::list_modes(camera),
             faces_user: is_lone && !is_pair && modes::faces_user(camera),
-            is_relative,
+            metres,
             is_fallback: false,
         }
     }
@@ -113,13 +112,7 @@ impl System {
             (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
         }
         // A later look may need depth; without metric settings, relative depth is accepted.
-        let look = Look {
-            effect: Effect::Auto,
-            focus: FocusRule::Auto,
-            focus_range_m: 0.0,
-            strength: Strength::Default,
-            ..self.look.clone()
-        };
+        let look = Look { effect: Effect::Auto, ..self.look.clone() }.without_metres((0, 0));
         let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
         Ok((source, source_name))
     }

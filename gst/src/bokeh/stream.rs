@@ -3,9 +3,8 @@
 use std::time::Instant;
 
 use bokehcam::engine::FrameProcessor;
-use bokehcam::look::{Effect, Look, SourceDepth};
+use bokehcam::look::{Change, Effect, Look, LookFacts, Metres};
 use bokehcam::recording::depth_covers;
-use bokehcam::source::{DepthChoice, adapt_look};
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 
@@ -194,8 +193,8 @@ impl Imp {
         (stream.version, stream.has_depth) = (values.version, has_depth);
         let size = stream.pictures.as_ref().map(Pictures::size).ok_or(gst::FlowError::NotNegotiated)?;
         let followed = values.look(&stream.look).and_then(|look| {
-            let known = SourceDepth { has_depth, ..SourceDepth::default() };
-            let fitting = adapt_look(&look, &DepthChoice::Auto, known).map_err(|error| error.to_string())?;
+            let facts = LookFacts { has_depth, metres: Metres::Known, size, ..LookFacts::default() };
+            let (fitting, _) = look.change(&Change::default(), &facts).map_err(|error| error.to_string())?;
             let done = match &mut stream.processor {
                 Some(processor) => processor.set_look(&fitting),
                 None => {

@@ -22,9 +22,9 @@ use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pool;
 use bokehcam::look::number::{in_range_parser, parse_count, whole_number_parser};
-use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_RADIUS_PX, SourceDepth, Strength};
+use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Change, Look, LookFacts, MAX_RADIUS_PX, Metres, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::source::{self, DepthChoice, Size};
+use bokehcam::source::{DepthChoice, DepthOrigin, Size};
 
 /// Frames measured by default, if the time limit allows.
 const FRAMES: u32 = 20;
@@ -111,18 +111,15 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettin
         return Err(CliError::Usage(what.to_string()));
     }
     let look = look::build_look(&command.blur, &options::LookSettings::default())?;
-    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
-    let look = source::adapt_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, known)?;
+    let facts = LookFacts { keeps_alpha: true, ..command.blur.depth.look_facts(true, Metres::Known)? };
+    let (look, _) = Look { strength: Strength::Default, ..look }.change(&Change::default(), &facts)?;
     unused::warn_of_unused(
         &given.settings,
-        &unused::RunFacts {
-            source: unused::FrameOrigin::Bench,
-            depth: source::DepthOrigin::Metres,
-            uses_depth: true,
-            effect: look.effect,
-            cpu_only: command.backend == Backend::Cpu,
-            ..unused::RunFacts::default()
-        },
+        &unused::RunFacts { cpu_only: command.backend == Backend::Cpu, ..unused::RunFacts::default() }.for_look(
+            unused::FrameOrigin::Bench,
+            DepthOrigin::Metres,
+            &look,
+        ),
     );
     if !command.json {
         print_to_stdout(HEADING.as_bytes())?;

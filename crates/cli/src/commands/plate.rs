@@ -19,6 +19,7 @@ use bokehcam::capture::{Camera, Captured, FrameBuffers};
 use bokehcam::depth::plate::{Capture, CaptureResult, Step};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+use bokehcam::look::{Effect, Look};
 use bokehcam::recording::still;
 use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, single_camera};
 
@@ -61,12 +62,11 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &GivenSettin
     let Source { camera, depth_from, .. } = Source::open(name, &options, None)?;
     unused::warn_of_unused(
         &given.settings,
-        &unused::RunFacts {
-            source: unused::FrameOrigin::Source(name.kind()),
-            depth: depth_from,
-            realtime: camera.info().live,
-            ..unused::RunFacts::default()
-        },
+        &unused::RunFacts { realtime: camera.info().live, ..unused::RunFacts::default() }.for_look(
+            unused::FrameOrigin::Source(name.kind()),
+            depth_from,
+            &Look::with_effect(Effect::None),
+        ),
     );
     // Ctrl-C ends the reading, not the program: a recording's plate so far is still written.
     let stop = terminal::stop_flag()?;

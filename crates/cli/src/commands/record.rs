@@ -14,6 +14,7 @@ use crate::terminal;
 use bokehcam::capture::{Captured, FrameBuffers, FrameData};
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+use bokehcam::look::{Effect, Look};
 use bokehcam::recording::RecordingWriter;
 use bokehcam::recording::tum::RecordingSummary;
 use bokehcam::source::{Options, Source, SourceName};
@@ -116,13 +117,11 @@ fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source,
     let source = Source::open(&command.source, &options, None)?;
     unused::warn_of_unused(
         &given.settings,
-        &unused::RunFacts {
-            source: unused::FrameOrigin::Source(command.source.kind()),
-            depth: source.depth_from,
-            uses_depth: true,
-            realtime: true,
-            ..unused::RunFacts::default()
-        },
+        &unused::RunFacts { realtime: true, ..unused::RunFacts::default() }.for_look(
+            unused::FrameOrigin::Source(command.source.kind()),
+            source.depth_from,
+            &Look::with_effect(Effect::Dof),
+        ),
     );
     if source.rig.is_some_and(|rig| !rig.metric) {
         tracing::warn!(

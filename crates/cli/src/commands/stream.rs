@@ -13,7 +13,7 @@ use control::{ControlServer, LookChanger, RunInfo, RunStats};
 
 #[cfg(feature = "window")]
 use crate::commands::preview;
-use crate::controlled::{self, CommandLineRules};
+use crate::controlled;
 use crate::error::CliError;
 use crate::files::warn_of_leftovers;
 use crate::focus;
@@ -22,7 +22,7 @@ use crate::options;
 use crate::report;
 use crate::settings::file::SettingsFile;
 use crate::settings::layers::GivenSettings;
-use crate::settings::look;
+use crate::settings::look::RequestedLook;
 use crate::settings::unused;
 use crate::sinks;
 use crate::terminal;
@@ -31,14 +31,13 @@ use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::control::{Claim, Name, Status};
-use bokehcam::controller::SourceFacts;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Look, Strength};
+use bokehcam::look::{Look, LookFacts};
 use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, PipelineError, Run};
 use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
-use bokehcam::source::{self, DepthChoice, Source, SourceName};
+use bokehcam::source::{self, DepthOrigin, Source, SourceName};
 use bokehcam::stats::Report;
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
@@ -124,6 +123,8 @@ struct Opened {
     info: SourceInfo,
     /// The look, limited to the source's abilities.
     look: Look,
+    /// What later looks may be.
+    facts: LookFacts,
     pace: Pace,
     /// Facts for warnings about settings without effect.
     unused: unused::RunFacts,
@@ -133,31 +134,31 @@ impl Opened {
     /// Opens the source, and warns of settings without effect on it.
     fn open(command: &StreamCommand, given: &GivenSettings) -> Result<Self, CliError> {
         let StreamCommand { parts, to, .. } = command;
-        let given_look = look::build_look(&parts.blur, &parts.computing.quality)?;
+        let requested = RequestedLook::new(&parts.blur, &parts.computing.quality, given)?;
         let options = source::Options { filters: command.is_filter(), ..parts.source_options() };
-        let source = Source::open(&command.source, &options, Some(&given_look))?;
+        let source = Source::open(&command.source, &options, Some(&requested.for_opening()))?;
         let info = source.camera.info();
         let is_live = info.live || to.iter().any(Target::is_live);
         let pace = parts.stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-        let look = source.adapt_look(&given_look, &options)?;
-        focus::note_place(&given_look, &look);
+        let keeps_alpha = to.iter().all(Target::keeps_alpha);
+        let facts = LookFacts { keeps_alpha, ..source.look_facts(&options)? };
+        let look = requested.fit(source.findings.focus, &facts)?;
+        focus::note_place(&requested.look, &look);
+        // Outputs have an alpha channel only if they are opened for it.
+        let facts = LookFacts { keeps_alpha: look.background == Background::Transparent, ..facts };
         let unused = unused::RunFacts {
-            source: unused::FrameOrigin::Source(command.source.kind()),
-            depth: source.depth_from,
-            uses_depth: look.effect.follows_depth(),
-            effect: look.effect,
-            lens: matches!(look.strength, Strength::Lens(_)),
             realtime: pace == Pace::Realtime,
             cpu_only: parts.computing.backend == Backend::Cpu,
             compresses: to.iter().any(|target| matches!(target, Target::Video(_))),
-            window: false,
+            ..unused::RunFacts::default()
         };
-        unused::warn_of_unused(&given.settings, &unused);
+        let origin = unused::FrameOrigin::Source(command.source.kind());
+        unused::warn_of_unused(&given.settings, &unused.for_look(origin, source.depth_from, &look));
         source.findings.notes.iter().for_each(|note| log::note(note));
         if let Some(map) = source.first_depth.as_ref() {
             focus::warn_of_distances(&look, info.size, map, (source.depth_from, options.depth.depth_scale));
         }
-        Ok(Self { source, options, info, look, pace, unused })
+        Ok(Self { source, options, info, look, facts, pace, unused })
     }
 
     /// Whether the quality adapts to the available time.
@@ -186,7 +187,7 @@ impl StreamCommand {
             force: output.force,
             out_size: stream.out_size.map(|size| (size.width, size.height)),
             threads: options.computing.threads,
-            alpha: opened.look.background == Background::Transparent,
+            alpha: opened.facts.keeps_alpha,
             demand: demand.cloned(),
             filter_target: self.source.pipewire_name().map(str::to_owned),
             sound: sinks::find_sound(&self.to, &self.source, &self.parts.frames)?,
@@ -231,7 +232,7 @@ impl StreamCommand {
         looks: LookChanger,
         config: Option<&Path>,
     ) -> Result<Option<ControlServer>, CliError> {
-        let Opened { source, options, info, unused, .. } = opened;
+        let Opened { source, info, facts, unused, .. } = opened;
         let claim = match claim {
             Ok(claim) => claim,
             Err(why) => {
@@ -249,20 +250,16 @@ impl StreamCommand {
                 sinks: self.to.iter().map(Target::to_string).collect(),
                 ..Status::default()
             },
-            facts: SourceFacts {
-                kind: self.source.kind(),
-                size: info.size,
-                has_depth: source.has_depth() && options.depth_choice != DepthChoice::None,
-                depth_from: source.depth_from,
-                depth_choice: options.depth_choice.clone(),
-            },
+            facts: *facts,
+            kind: self.source.kind(),
+            depth_from: if facts.has_depth { source.depth_from } else { DepthOrigin::Nothing },
             demand,
             shutter,
             stats,
         };
-        let rules = CommandLineRules { config: config.map(Path::to_owned), unused: *unused };
+        let command_line = controlled::command_line(config.map(Path::to_owned), *unused);
         let tray = self.tray.then(|| SettingsFile::load(config)).transpose()?;
-        control::serve(claim, run, looks, rules, tray.map(|file| file.preset_names())).map(Some)
+        control::serve(claim, run, looks, command_line, tray.map(|file| file.preset_names())).map(Some)
     }
 }
 

@@ -1,8 +1,61 @@
 //! Conversion of options to a look.
 
+use super::layers::GivenSettings;
 use crate::error::CliError;
+use crate::log;
 use crate::options;
-use bokehcam::look::{Look, Patch};
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::look::settings::find_setting;
+use bokehcam::look::{Change, Look, LookFacts, Patch};
+
+/// The look that a command line asks for.
+pub struct RequestedLook {
+    /// The look, before it is limited to the source's abilities.
+    pub look: Look,
+    change: Change,
+}
+
+impl RequestedLook {
+    /// Reads the look of the options; `given` says what of it comes from a preset.
+    ///
+    /// # Errors
+    /// See [`build_look`].
+    pub fn new(
+        blur: &options::Blur,
+        quality: &options::LookSettings<true>,
+        given: &GivenSettings,
+    ) -> Result<Self, CliError> {
+        let look = build_look(blur, quality)?;
+        let patch = blur.look.0.clone();
+        let mut asked = patch.clone();
+        let of_preset = given.settings.iter().filter(|setting| setting.origin == "preset");
+        of_preset.filter_map(|setting| find_setting(&setting.name)).for_each(|setting| setting.clear_in(&mut asked));
+        Ok(Self { look, change: Change { patch, asked } })
+    }
+
+    /// Returns the look for which a source is opened: without the metres of a preset, as the source may lack them.
+    pub fn for_opening(&self) -> Look {
+        match self.change.asked.metric_settings(false).is_empty() {
+            true => self.look.clone().without_metres((0, 0)),
+            false => self.look.clone(),
+        }
+    }
+
+    /// Returns the look as far as a run can have it, and logs a note on what is left out. The focus that was `found` in a
+    /// photo replaces an automatic one.
+    ///
+    /// # Errors
+    /// The run cannot have what is asked for.
+    pub fn fit(&self, found: Option<FocusRule>, facts: &LookFacts) -> Result<Look, CliError> {
+        let mut change = self.change.clone();
+        if self.look.focus == FocusRule::Auto {
+            change.patch.focus = found.or(change.patch.focus);
+        }
+        let (look, note) = self.look.change(&change, facts)?;
+        note.iter().for_each(|line| log::note(line));
+        Ok(look)
+    }
+}
 
 /// Returns the look of the options, before it is limited to the source's abilities.
 ///

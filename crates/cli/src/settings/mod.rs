@@ -2,7 +2,6 @@
 //! printing and saving.
 
 pub mod arguments;
-pub mod changes;
 #[cfg(feature = "window")]
 pub mod command_line;
 pub mod dump;

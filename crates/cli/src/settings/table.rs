@@ -61,12 +61,7 @@ pub fn is_setting(name: &str) -> bool {
 
 /// Returns the setting that clap would suggest for a misspelt name.
 pub fn suggest_setting(name: &str) -> Option<String> {
-    suggest_option(all_settings_command(), name)
-}
-
-/// Returns the option of a command that clap would suggest for a misspelt name.
-pub fn suggest_option(command: Command, name: &str) -> Option<String> {
-    let error = command.try_get_matches_from([format!("--{name}")]).err()?;
+    let error = all_settings_command().try_get_matches_from([format!("--{name}")]).err()?;
     let suggested = error.get(ContextKind::SuggestedArg)?;
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
 }

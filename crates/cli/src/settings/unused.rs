@@ -5,7 +5,7 @@
 use super::layers::Setting;
 use super::table::{WINDOW_START, WINDOW_STATE, active_variable};
 use crate::log;
-use bokehcam::look::{Effect, Value};
+use bokehcam::look::{Effect, Look, Strength, Value};
 use bokehcam::source::{DepthOrigin, Kind};
 
 /// Facts of a run that decide which settings have an effect.
@@ -29,6 +29,14 @@ pub struct RunFacts {
     pub compresses: bool,
     /// Whether the run has a window.
     pub window: bool,
+}
+
+impl RunFacts {
+    /// Returns these facts with those of a source of frames, the origin of its depth, and the look.
+    pub fn for_look(self, source: FrameOrigin, depth: DepthOrigin, look: &Look) -> Self {
+        let (effect, lens) = (look.effect, matches!(look.strength, Strength::Lens(_)));
+        Self { source, depth, uses_depth: effect.follows_depth(), effect, lens, ..self }
+    }
 }
 
 impl Default for RunFacts {
@@ -195,7 +203,7 @@ pub fn describe_unused(changed: &[Value], run: &RunFacts) -> Option<String> {
 /// Warns of the given settings without effect on this kind of source; all others can be changed in the window.
 #[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
-    let run = RunFacts { source: FrameOrigin::Source(source), realtime: true, window: true, ..RunFacts::default() };
+    let run = RunFacts { source: FrameOrigin::Source(source), ..RunFacts::default() };
     format_line(find_unmet(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
 }
 

@@ -94,7 +94,7 @@ fn what_others_change_is_judged_as_in_a_stream_and_is_not_remembered() {
     let set = program.ctl(&["set", "focus=1.0", "rim=0.7"]);
     let warning = "warning: without effect here: --focus 1 (there is no depth)";
     assert!(set.done().contains(warning), "{}", set.stderr);
-    program.ctl(&["set", "effect=dof"]).failed(2, &["--effect dof needs depth, and this run has none"]);
+    program.ctl(&["set", "effect=dof"]).failed(2, &["--effect dof needs depth: leave --depth none out"]);
     assert_eq!(status(&program)["look"]["rim"], "0.7");
     program.interrupt();
     let ended = program.end();

@@ -124,7 +124,7 @@ fn add_status(ui: &mut Ui, state: &State) {
         // Shortened, to leave room for the focus distance.
         parts.push(truncate_end(state.title(), 34));
     }
-    let focused = state.look.effect.follows_depth() && !state.camera.is_relative;
+    let focused = state.look.effect.follows_depth() && !state.lacks_metres();
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
         parts.push(tr_with("focused at {} m", &[&format_number(metres, 2)]));
     }

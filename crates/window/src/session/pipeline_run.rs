@@ -12,15 +12,15 @@ use super::outputs::Outputs;
 use super::{EventSender, SessionConfig, SessionEvent};
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
-use bokehcam::look::{Look, SourceDepth};
+use bokehcam::look::{Look, LookFacts};
 use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Destination, Pace, PipelineError, Run};
 use bokehcam::source::{Kind, SourceName};
 use bokehcam::stats::Report;
 
 /// A running pipeline, and the handles that control it.
 pub(super) struct PipelineRun {
-    size: (u32, u32),
-    source_depth: SourceDepth,
+    /// What its source allows a look.
+    pub facts: LookFacts,
     changes: ChangeSender,
     stop: Arc<AtomicBool>,
     /// Progress of the background plate, if depth comes from it.
@@ -47,8 +47,8 @@ impl PipelineRun {
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
-        let source_depth = SourceDepth { has_depth, is_relative: camera.is_relative, size: info.size };
-        let look = config.look.for_source(source_depth);
+        let facts = LookFacts { has_depth, metres: camera.metres, size: info.size, ..LookFacts::default() };
+        let look = config.look.for_source(&facts);
         let (blurring, changes) = BlurSetup::create(look, (info.size, ADAPTIVE_QUALITY), |settings| {
             config.services.create_executor(settings, info.size)
         })?;
@@ -92,21 +92,16 @@ impl PipelineRun {
             Some(report)
         });
         let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
-        let pipeline_run = Self { size: info.size, source_depth, changes, stop, guide, thread };
+        let pipeline_run = Self { facts, changes, stop, guide, thread };
         Ok((pipeline_run, Source::Running(running)))
     }
 
-    /// Returns the look as far as the source supports it.
-    pub(super) fn adapt_look(&self, look: &Look) -> Look {
-        look.for_source(self.source_depth)
-    }
-
-    /// Blurs with this look from now on, which the source must [support](Self::adapt_look); its frames carry `number`.
+    /// Blurs with this look from now on, which must [suit](Look::for_source) the source; its frames carry `number`.
     ///
     /// # Errors
     /// Returns a one-line message if the executor cannot be created. The previous look stays active.
     pub(super) fn switch_look(&mut self, look: Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
-        let size = self.size;
+        let size = self.facts.size;
         self.changes.switch_look(look, number, |settings| {
             let began = Instant::now();
             let bokeh = services.create_executor(settings, size)?;

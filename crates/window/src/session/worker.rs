@@ -234,7 +234,7 @@ impl SessionWorker {
         };
         match PipelineRun::start(opened, &mut self.config, &self.events, &mut self.outputs, ended) {
             Ok((pipeline, source)) => {
-                self.looks = VecDeque::from([(0, pipeline.adapt_look(&self.config.look))]);
+                self.looks = VecDeque::from([(0, self.config.look.for_source(&pipeline.facts))]);
                 self.pipeline = Some(pipeline);
                 self.events.send_update(Update::Source(source));
                 // Those of the command line begin with the first source.

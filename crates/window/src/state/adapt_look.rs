@@ -1,17 +1,17 @@
 //! Adapts the look to the source.
 
 use super::{Source, State};
-use bokehcam::look::{Effect, Look, SourceDepth};
+use bokehcam::look::{Effect, Look, LookFacts, Metres};
 
 impl State {
-    /// Returns the properties of the source's depth.
-    pub fn source_depth(&self) -> SourceDepth {
-        let size = match &self.source {
-            Source::Running(running) => running.size,
-            _ => (1280, 720),
+    /// Returns what the source allows a look. The outputs of a window have no alpha channel.
+    pub fn look_facts(&self) -> LookFacts {
+        let (metres, size) = match &self.source {
+            Source::Running(running) => (self.camera.metres, running.size),
+            _ => (Metres::Unknown, (0, 0)),
         };
-        let is_relative = self.camera.is_relative && matches!(self.source, Source::Running(_));
-        SourceDepth { has_depth: self.may_have_depth(), is_relative, size }
+        let (has_depth, is_declined) = (self.may_have_depth(), self.has_declined_depth());
+        LookFacts { has_depth, is_declined, metres, size, keeps_alpha: false }
     }
 
     /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
@@ -22,7 +22,7 @@ impl State {
 
     /// Returns the look as far as the source supports it, and records if its effect was replaced.
     pub(super) fn adapt_look(&mut self, look: Look) -> Look {
-        let adapted = look.for_source(self.source_depth());
+        let adapted = look.for_source(&self.look_facts());
         self.effect_replaced |= adapted.effect != look.effect;
         adapted
     }
@@ -30,29 +30,55 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use super::super::apply::NO_METRES;
     use super::super::sample::{look, running, state};
     use super::super::{Action, Camera, Request, Update, tweak};
     use super::*;
     use bokehcam::depth::focus::FocusRule;
-    use bokehcam::look::{Patch, Strength};
+    use bokehcam::look::presets::Preset;
+    use bokehcam::look::{Change, Patch, Strength};
 
     #[test]
     fn where_depth_is_relative_no_look_has_metres() {
         let mut state = state();
         let lens = Strength::Lens(tweak::DEFAULT_LENS);
         state.look = Look { focus: FocusRule::Metres(2.5), strength: lens, focus_range_m: 0.4, ..look() };
-        state.apply_update(Update::Camera(Camera { is_relative: true, ..Camera::default() }));
+        state.apply_update(Update::Camera(Camera { metres: Metres::Missing, ..Camera::default() }));
         let told = state.apply_update(Update::Source(running(true)));
-        assert!(matches!(told, Some(Request::Look(look)) if look.metric_setting().is_none()), "{:?}", state.look);
-        assert_eq!(state.look.metric_setting(), None);
+        assert!(matches!(told, Some(Request::Look(look)) if !look.needs_metres()), "{:?}", state.look);
+        assert!(!state.look.needs_metres());
         assert!(state.notes.iter().any(|note| note.text.contains("in metres")), "and it is said");
         // Nothing restores them, and keys for metric settings change the amount instead.
         let before = tweak::coc_fraction(&state.look, 720).unwrap();
         let mut more = state.look.clone();
         tweak::scale_f_number(&mut more, 0.5, 1.0, (1280, 720));
         state.apply(Action::Look { look: Box::new(more), stroke: None });
-        assert!(state.look.metric_setting().is_none() && tweak::coc_fraction(&state.look, 720).unwrap() > 1.5 * before);
-        assert!(state.patch_look(&Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() }).is_err());
+        assert!(!state.look.needs_metres() && tweak::coc_fraction(&state.look, 720).unwrap() > 1.5 * before);
+        let asked = Change::to_settings(Patch { focus: Some(FocusRule::Metres(2.0)), ..Patch::default() });
+        assert!(state.look.change(&asked, &state.look_facts()).is_err());
+        // A preset is taken without them, whether it has an effect or not.
+        for effect in [None, Some(Effect::Auto)] {
+            let patch = Patch { effect, focus_range_m: Some(0.3), rim: Some(0.7), ..Patch::default() };
+            state.presets = vec![Preset { name: "near".into(), patch, is_user_defined: true }];
+            (state.look.rim, state.notes) = (0.2, Vec::new());
+            state.apply(Action::Preset("near".into()));
+            assert!(state.look.rim == 0.7 && !state.look.needs_metres(), "{:?}", state.look);
+            assert_eq!(state.notes.last().unwrap().text, NO_METRES);
+        }
+    }
+
+    #[test]
+    fn a_window_takes_no_transparency_whoever_asks() {
+        let mut state = state();
+        let patch = Patch::parse([("behind", "transparent")]).unwrap();
+        state.presets = vec![Preset { name: "cut".into(), patch: patch.clone(), is_user_defined: true }];
+        for source in [Source::Opening, running(true)] {
+            state.source = source;
+            assert_eq!(state.apply(Action::Preset("cut".into())), []);
+            assert!(state.notes.last().unwrap().text.starts_with("preset cut: --behind transparent"));
+            let change = Change::to_settings(patch.clone());
+            assert!(state.look.change(&change, &state.look_facts()).is_err());
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Applies actions to the state.
 
 use super::{Action, Output, Request, Source, State, ViewMode};
-use bokehcam::look::{Effect, Look, Patch, Strength};
+use bokehcam::look::{Change, Effect, Look, LookError, Strength};
 
 /// Shown when a look or a view needs depth and the source has none.
 pub const NO_DEPTH: &str = "Nothing is known about depth here: use a small network or a picture of the empty room.";
@@ -183,37 +183,22 @@ impl State {
             self.note(format!("There is no preset '{name}'."));
             return Vec::new();
         };
-        match self.patch_look(&preset.patch) {
-            Ok(look) => {
+        match self.look.change(&Change::to_preset(preset.patch.clone()), &self.look_facts()) {
+            Ok((look, left_out)) => {
                 self.chosen_preset = Some(name.to_owned());
+                if left_out.is_some() {
+                    self.note(NO_METRES);
+                }
                 self.set_look(look, None)
             }
-            Err(line) => {
-                let line = if line == self.no_depth_advice() { line } else { format!("preset {name}: {line}") };
-                self.note(line);
+            Err(LookError::NoDepth { .. }) => {
+                self.note(self.no_depth_advice());
                 Vec::new()
             }
-        }
-    }
-
-    /// Returns the look after a patch.
-    ///
-    /// # Errors
-    /// Returns a one-line message if the patch needs depth that the source lacks, or its settings conflict.
-    pub fn patch_look(&self, patch: &Patch) -> Result<Look, String> {
-        if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
-            return Err(self.no_depth_advice().to_owned());
-        }
-        let look = patch.apply_to(&self.look).map_err(|error| error.to_string())?;
-        let is_lens = |look: &Look| matches!(look.strength, Strength::Lens(_));
-        let asks = patch.focus.is_some_and(|focus| focus.for_depth(true).is_none())
-            || patch.focus_range_m.is_some_and(|range_m| range_m > 0.0)
-            || is_lens(&look) && !is_lens(&self.look);
-        // In a whole look, such as a preset, metric settings are dropped instead of rejected.
-        let is_one_change = patch.effect.is_none();
-        match self.source_depth().is_relative && look.effect.follows_depth() && is_one_change && asks {
-            true => Err(NO_METRES.to_owned()),
-            false => Ok(look),
+            Err(error) => {
+                self.note(format!("preset {name}: {error}"));
+                Vec::new()
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! Properties of a camera besides its controls, and settings that depend on them.
 
 use super::{Request, Source, State};
+use bokehcam::look::Metres;
 use bokehcam::source::modes::Mode;
 
 /// Camera modes, and properties of the running source.
@@ -10,8 +11,8 @@ pub struct Camera {
     pub modes: Vec<Mode>,
     /// Whether the camera faces the user, who then expects a mirrored picture.
     pub faces_user: bool,
-    /// Whether depth is relative, without metres; applies to any kind of source.
-    pub is_relative: bool,
+    /// What the distances of depth mean; applies to any kind of source.
+    pub metres: Metres,
     /// Whether it is the demonstration, shown for want of a camera.
     pub is_fallback: bool,
 }
@@ -23,6 +24,11 @@ impl State {
             self.mirror = camera.faces_user;
         }
         self.camera = camera;
+    }
+
+    /// Whether depth is relative, without metres; while a source opens, as it was before.
+    pub fn lacks_metres(&self) -> bool {
+        self.camera.metres == Metres::Missing
     }
 
     /// Requests another frame size and rate of the camera.

@@ -2,7 +2,7 @@
 
 use super::apply::NO_METRES;
 use super::{Request, Source, State, Update, ViewMode};
-use bokehcam::look::Look;
+use bokehcam::look::{Look, Metres};
 
 /// Shown when a camera replaces the demonstration.
 const CAMERA_FOUND: &str = "A camera was connected: here it is.";
@@ -61,7 +61,7 @@ impl State {
             }
             _ => self.look.clone(),
         };
-        if self.source_depth().is_relative && self.may_have_depth() && chosen.metric_setting().is_some() {
+        if self.look_facts().metres == Metres::Missing && self.may_have_depth() && chosen.needs_metres() {
             self.note(NO_METRES);
         }
         let look = self.adapt_look(chosen);

@@ -22,7 +22,7 @@ use super::session;
 use super::state::State;
 use bokehcam::compute::device::Device;
 use bokehcam::control::Claim;
-use bokehcam::controller::Rules;
+use bokehcam::controller::CommandLine;
 use bokehcam::stats::Report;
 
 bokehcam::names::named! {
@@ -58,10 +58,10 @@ impl From<accesskit_winit::Event> for UserEvent {
     }
 }
 
-/// Name and rules of remote control.
+/// Name of remote control, and its presets.
 pub struct RemoteConfig {
     pub claim: Claim,
-    pub rules: Arc<dyn Rules>,
+    pub command_line: CommandLine,
 }
 
 /// Configuration of a preview.

@@ -8,25 +8,25 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::controlled::{self, CommandLineRules};
+use crate::controlled;
 use crate::error::CliError;
 use crate::options::{Global, Streaming, Window};
 use crate::report;
 use crate::settings::file;
 use crate::settings::layers::GivenSettings;
-use crate::settings::look;
+use crate::settings::look::RequestedLook;
 use crate::settings::unused;
 use crate::sinks;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::control::Name;
-use bokehcam::depth::focus::FocusRule;
+use bokehcam::depth::backdrop::Background;
 use bokehcam::files::user_folders::Folders;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{BackgroundSetting, Effect, Look, SourceDepth};
+use bokehcam::look::{Effect, Look, Metres};
 use bokehcam::pipeline::Pace;
 use bokehcam::sink::Target;
-use bokehcam::source::{self, SourceName};
+use bokehcam::source::SourceName;
 use bokehcam_window::session::SessionConfig;
 use bokehcam_window::state::{Output, State};
 use bokehcam_window::system::System;
@@ -99,7 +99,7 @@ pub fn show_source(
     }
     let outputs = list_outputs(to)?;
     report::check_writable(stream.report.as_deref())?;
-    let look = initial_look(parts)?;
+    let look = initial_look(parts, &given)?;
     // `--fresh` neither reads nor overwrites the remembered state.
     let saved_state_file = file::state_folder().map(|folder| folder.join("window.toml")).filter(|_| !window.fresh);
     let saved_state = saved_state_file.as_deref().and_then(SavedState::read).unwrap_or_default();
@@ -111,17 +111,14 @@ pub fn show_source(
         restore_look(&mut state, &saved_state);
     }
     let store = FileStore { chosen: global.config.clone(), given };
-    let rules = CommandLineRules {
-        config: global.config.clone(),
-        unused: unused::RunFacts {
-            cpu_only: computing.backend == Backend::Cpu,
-            realtime: true,
-            window: true,
-            ..unused::RunFacts::default()
-        },
+    let unused = unused::RunFacts {
+        cpu_only: computing.backend == Backend::Cpu,
+        realtime: true,
+        window: true,
+        ..unused::RunFacts::default()
     };
-    let control =
-        controlled::claim_name(run_name, "preview")?.map(|claim| RemoteConfig { claim, rules: Arc::new(rules) });
+    let command_line = controlled::command_line(global.config.clone(), unused);
+    let control = controlled::claim_name(run_name, "preview")?.map(|claim| RemoteConfig { claim, command_line });
     let mut system = System::new(parts.source_options(), state.look.clone(), Box::new(store));
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
@@ -152,12 +149,6 @@ fn check_options(parts: &Streaming, to: &[Target]) -> Result<(), CliError> {
     if parts.stream.on_demand {
         return refuse("--on-demand: the window always watches; leave --on-demand out, or use `bokehcam stream`");
     }
-    if parts.blur.look.0.behind.as_ref().is_some_and(BackgroundSetting::is_transparent) {
-        return refuse(
-            "--behind transparent: a window shows no transparency; `bokehcam stream SOURCE --to FILE.webm` (or FILE.mov, \
-             or DIR/ for PNG) writes it",
-        );
-    }
     Ok(())
 }
 
@@ -174,14 +165,11 @@ fn list_outputs(to: &[Target]) -> Result<Vec<Output>, CliError> {
 
 /// Returns the look of the command line, as if there were depth: the source's is known only once it is open, and the
 /// window may open others.
-fn initial_look(parts: &Streaming) -> Result<Look, CliError> {
-    let look = look::build_look(&parts.blur, &parts.computing.quality)?;
-    let known = SourceDepth { has_depth: true, ..SourceDepth::default() };
-    let focus = look.focus;
-    let look = Look { focus: focus.for_depth(false).unwrap_or(FocusRule::Auto), ..look };
-    let look = source::adapt_look(&look, &parts.blur.depth, known)?;
+fn initial_look(parts: &Streaming, given: &GivenSettings) -> Result<Look, CliError> {
+    let facts = parts.blur.depth.look_facts(true, Metres::Unknown)?;
+    let look = RequestedLook::new(&parts.blur, &parts.computing.quality, given)?.fit(None, &facts)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
-    Ok(Look { effect, focus, ..look })
+    Ok(Look { effect, ..look })
 }
 
 /// Writes and prints the report, also of a preview that failed.
@@ -237,7 +225,7 @@ fn configure_session(
 fn restore_look(state: &mut State, saved_state: &SavedState) {
     let mut dropped = Vec::new();
     let restored = saved_state.restore_look(|line| dropped.push(line));
-    if let Some(restored) = restored.filter(|restored| *restored != state.look) {
+    if let Some(restored) = restored.filter(|look| *look != state.look && look.background != Background::Transparent) {
         state.look = restored;
         state.note(RESTORED_LOOK);
     }

@@ -10,12 +10,13 @@ use std::thread;
 
 use super::listing::{Picture, list_pictures};
 use super::map_folder::MapFolder;
-use super::{RenderCommand, RenderedFile, build_look, input_files, render};
+use super::{RenderCommand, RenderedFile, input_files, render, request_look};
 use crate::error::CliError;
 use crate::files::{refuse_overwrite, refuse_overwriting_source, warn_of_leftovers};
 use crate::log::{self, Remark};
 use crate::options::Global;
 use crate::settings::layers::GivenSettings;
+use crate::settings::look::RequestedLook;
 use crate::terminal::{Progress, print_to_stderr, stop_flag_between};
 use bokehcam::compute::{Backend, memory};
 use bokehcam::computing::ExecutorFactory;
@@ -68,13 +69,13 @@ struct MapFolders<'a> {
 /// Fails if the command line does not fit many pictures, before anything is written; and at the end if a picture
 /// failed, or was not begun because of Ctrl-C.
 pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSettings) -> Result<(), CliError> {
-    let look = build_look(command)?;
+    let requested = request_look(command, given)?;
     let (depth, mask) = (command.depth_map.as_deref(), command.mask.as_deref());
     let maps = MapFolders {
         depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &["-depth", ".depth", ""])).transpose()?,
         mask: mask.map(|dir| MapFolder::read("--mask", dir, &["-mask", ".mask", ""])).transpose()?,
     };
-    let format = result_format(command, &look)?;
+    let format = result_format(command, &requested.look)?;
     let pictures = list_pictures(&command.images, &command.out, format)?;
     refuse_overwriting_inputs(command, &maps, &pictures)?;
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
@@ -89,7 +90,7 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
             && let at = next.fetch_add(1, Ordering::Relaxed)
             && let Some(picture) = pictures.get(at)
         {
-            let (outcome, remarks) = log::hold_remarks(|| process(&command, &maps, picture, &look, given));
+            let (outcome, remarks) = log::hold_remarks(|| process(&command, &maps, picture, &requested, given));
             if let (Outcome::Written(RenderedFile { executor, depth_by }), 1..) = (&outcome, global.verbose) {
                 let by = depth_by.as_ref().map_or(String::new(), |by| format!(", depth by {by}"));
                 print_to_stderr(&format!("{}: written ({executor}{by})", picture.target.display()));
@@ -177,13 +178,13 @@ fn process(
     command: &RenderCommand,
     maps: &MapFolders,
     picture: &Picture,
-    look: &Look,
+    requested: &RequestedLook,
     given: &GivenSettings,
 ) -> Outcome {
     // A panic fails this picture only.
     let rendered = CliError::catch_panic(|| {
         refuse_overwrite([picture.target.as_path()], command.output.force)?;
-        render(&maps.command_for(command, picture)?, look, given)
+        render(&maps.command_for(command, picture)?, requested, given)
     });
     let changed = |path: &Path| fs::metadata(path).and_then(|file| file.modified()).ok();
     match rendered {

@@ -12,7 +12,7 @@ use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
-use bokehcam::recording::depth_file::{DepthFile, DepthUnit};
+use bokehcam::recording::depth_file::DepthFile;
 use bokehcam::recording::mask_file::{self, MaskFile};
 use bokehcam::recording::{Photo, snapshot};
 use bokehcam::source::orientation::transform_photo;
@@ -63,11 +63,11 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
     if let Some((made, from)) = compute_depth(command, look, (&input.photo.color, own_px))? {
         (input.depth, input.depth_from) = (Some(made), from);
     } else if let Some(file) = &command.depth_map {
-        let (mut map, from) = read_depth(file, command, look, own_px)?;
+        let (mut map, from) = read_depth(file, command, own_px)?;
         source::find_person(&command.source_options(), look, &input.photo.color, &mut map);
         (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
     } else if let Some(file) = kept_depth {
-        let (map, from) = read_depth(&file, command, look, own_px)?;
+        let (map, from) = read_depth(&file, command, own_px)?;
         (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
     } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
         find_depth(&image, command, look, &mut input)?;
@@ -107,7 +107,6 @@ fn compute_depth(
             Err(CliError::Usage(what.to_string()))
         }
         (Some(file), _) => {
-            source::reject_metric_look(look, "a mask gives")?;
             let MaskFile { mask, notes } = mask_file::read(file, own_px)?;
             notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
             let mask = command.orientation.transform().apply_to_mask(&mask, own_px);
@@ -127,7 +126,6 @@ fn compute_depth(
             Ok(Some((depth, DepthOrigin::Networks)))
         }
         (None, DepthChoice::Defocus) => {
-            source::reject_metric_look(look, "defocus gives")?;
             let Some(map) = defocus::estimate_depth(color) else {
                 let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so its \
                             depth cannot be estimated; use --depth mono or --effect blur";
@@ -142,24 +140,11 @@ fn compute_depth(
 /// Reads the depth map `file` for a picture that is `own_px` large in its file, and says what was assumed.
 ///
 /// # Errors
-/// The file cannot be read, or the look needs metres and its distances are only relative.
-fn read_depth(
-    file: &Path,
-    command: &RenderCommand,
-    look: &Look,
-    own_px: (u32, u32),
-) -> Result<(DepthMap, DepthOrigin), CliError> {
+/// The file cannot be read.
+fn read_depth(file: &Path, command: &RenderCommand, own_px: (u32, u32)) -> Result<(DepthMap, DepthOrigin), CliError> {
     let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, own_px)?;
-    let origin = DepthOrigin::from(distances);
-    if origin.is_relative() {
-        let hint = match command.depth.depth_unit {
-            Some(DepthUnit::Inverse) => "",
-            _ => " (disparity becomes metres by `depth --metres`)",
-        };
-        source::reject_metric_look(look, &format!("{} has relative depth{hint}, which gives", file.display()))?;
-    }
     notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
-    Ok((command.orientation.transform().transform_map(map, own_px), origin))
+    Ok((command.orientation.transform().transform_map(map, own_px), distances.into()))
 }
 
 /// Warns of a mask that separates nothing.

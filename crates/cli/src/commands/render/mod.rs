@@ -21,19 +21,18 @@ use crate::focus;
 use crate::log;
 use crate::options;
 use crate::settings::layers::GivenSettings;
-use crate::settings::look;
+use crate::settings::look::RequestedLook;
 use crate::settings::unused;
 use crate::settings::unused::FrameOrigin;
 use crate::terminal;
 use bokehcam::compute::Backend;
 use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::depth::backdrop::Background;
-use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::number::whole_number_parser;
-use bokehcam::look::{ApertureSetting, Look, Refine, SourceDepth, Strength};
+use bokehcam::look::{ApertureSetting, Look, LookFacts, Refine};
 use bokehcam::names;
 use bokehcam::recording::snapshot;
 use bokehcam::recording::still::PhotoFormat;
@@ -124,11 +123,11 @@ pub fn run(mut command: RenderCommand, global: &options::Global, given: &GivenSe
     }
     command.image = command.images.pop();
     check_outputs(&command)?;
-    let look = build_look(&command)?;
-    check_transparency(&command, &look)?;
+    let requested = request_look(&command, given)?;
+    check_transparency(&command, &requested.look)?;
     create_parent_folder(&command.out)?;
     warn_of_leftovers([command.out.as_path()]);
-    let RenderedFile { executor, depth_by } = render(&command, &look, given)?;
+    let RenderedFile { executor, depth_by } = render(&command, &requested, given)?;
     if !global.quiet {
         depth_by.iter().for_each(|by| terminal::print_to_stderr(&format!("depth by {by}")));
         terminal::print_to_stderr(&format!("{}: written ({executor})", command.out.display()));
@@ -143,8 +142,8 @@ fn check_outputs(command: &RenderCommand) -> Result<(), CliError> {
     input_files(command).iter().try_for_each(|source| refuse_overwriting_source("--out", &command.out, source))
 }
 
-/// Builds the look, for depth that a picture can have.
-fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
+/// Reads the look, for depth that a picture can have.
+fn request_look(command: &RenderCommand, given: &GivenSettings) -> Result<RequestedLook, CliError> {
     let elsewhere = match &command.blur.depth {
         DepthChoice::Folder(path) | DepthChoice::Video(path) => Some(path.display().to_string()),
         DepthChoice::Device(name) => Some(name.clone()),
@@ -158,11 +157,12 @@ fn build_look(command: &RenderCommand) -> Result<Look, CliError> {
             DepthChoice::suggest_keyword(&name)
         )));
     }
-    let look = look::build_look(&command.blur, &command.computing.quality)?;
+    let requested = RequestedLook::new(&command.blur, &command.computing.quality, given)?;
+    let look = &requested.look;
     if let Background::Video(video) = &look.background {
         log::note(&format!("--behind video:{}: a picture shows its first frame", video.file.path.display()));
     }
-    Ok(look)
+    Ok(requested)
 }
 
 /// Refuses a result that keeps no transparency, if the look's background is transparent.
@@ -185,15 +185,13 @@ struct RenderedFile {
 }
 
 /// Blurs the command's only picture, and writes the result.
-fn render(command: &RenderCommand, look: &Look, given: &GivenSettings) -> Result<RenderedFile, CliError> {
-    let Input { mut photo, depth, depth_from, found } = read_input(command, look)?;
-    let focus = found.as_ref().and_then(|found| found.focus).filter(|_| look.focus == FocusRule::Auto);
-    let known =
-        SourceDepth { has_depth: depth.is_some(), is_relative: depth_from.is_relative(), size: photo.color.size() };
-    let wanted = Look { focus: focus.unwrap_or(look.focus), ..look.clone() };
-    let adapted = source::adapt_look(&wanted, &command.blur.depth, known)?;
-    focus::note_place(look, &adapted);
-    let look = adapted;
+fn render(command: &RenderCommand, requested: &RequestedLook, given: &GivenSettings) -> Result<RenderedFile, CliError> {
+    let Input { mut photo, depth, depth_from, found } = read_input(command, &requested.for_opening())?;
+    let facts = command.blur.depth.look_facts(depth.is_some(), depth_from.metres())?;
+    // The format of the result has been checked.
+    let facts = LookFacts { size: photo.color.size(), keeps_alpha: true, ..facts };
+    let look = requested.fit(found.as_ref().and_then(|found| found.focus), &facts)?;
+    focus::note_place(&requested.look, &look);
     command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
     let computing = command.computing.to_compute_options();
     let executor = blur::blur(&mut photo, depth, &look, &computing)?;
@@ -229,15 +227,8 @@ impl RenderCommand {
         let uses_depth = look.effect.follows_depth();
         unused::warn_of_unused(
             &given.settings,
-            &unused::RunFacts {
-                source: FrameOrigin::Picture,
-                depth: depth_from,
-                uses_depth,
-                effect: look.effect,
-                lens: matches!(look.strength, Strength::Lens(_)),
-                cpu_only: self.computing.backend == Backend::Cpu,
-                ..unused::RunFacts::default()
-            },
+            &unused::RunFacts { cpu_only: self.computing.backend == Backend::Cpu, ..unused::RunFacts::default() }
+                .for_look(FrameOrigin::Picture, depth_from, look),
         );
         if self.mask.is_some() {
             self.depth.describe_unused("that of a mask").iter().for_each(|unused| log::warn(unused));

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crate::controlled::{CommandLineRules, to_answer};
+use crate::controlled::to_answer;
 use crate::error::CliError;
 use crate::log;
 use bokehcam::budget::Quality;
@@ -16,13 +16,14 @@ use bokehcam::computing::ExecutorFactory;
 #[cfg(feature = "desktop")]
 use bokehcam::control::bus;
 use bokehcam::control::{Answer, Claim, Server, Status};
-use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
+use bokehcam::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
 use bokehcam::files::user_folders::{Folders, timestamped_stem};
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Look, Patch};
+use bokehcam::look::{Change, Look, LookFacts, Patch};
 use bokehcam::pipeline::{ChangeSender, Progress};
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::sink::ShutterControl;
+use bokehcam::source::{DepthOrigin, Kind};
 use bokehcam::stats::FrameRateMeter;
 
 /// Maximum wait for a picture to save.
@@ -60,7 +61,10 @@ impl Drop for ControlServer {
 pub(super) struct RunInfo {
     /// Constant part of the status.
     pub status: Status,
-    pub facts: SourceFacts,
+    /// What looks may be.
+    pub facts: LookFacts,
+    pub kind: Kind,
+    pub depth_from: DepthOrigin,
     /// Watchers of the outputs, if they are counted.
     pub demand: Option<Demand>,
     /// Closes the outputs, and captures pictures.
@@ -105,7 +109,7 @@ impl RunStats {
     }
 }
 
-/// Starts the control server with `rules`. With `tray`, the names of presets to show, it also serves the session's
+/// Starts the control server. With `tray`, the names of presets to show, it also serves the session's
 /// message bus and the tray icon.
 ///
 /// # Errors
@@ -114,7 +118,7 @@ pub(super) fn serve(
     claim: Claim,
     run: RunInfo,
     looks: LookChanger,
-    rules: CommandLineRules,
+    command_line: CommandLine,
     tray: Option<Vec<String>>,
 ) -> Result<ControlServer, CliError> {
     let no_thread = |error| CliError::io("a thread that answers `bokehcam ctl`".as_ref())(error);
@@ -125,7 +129,7 @@ pub(super) fn serve(
     let looks = thread::Builder::new().name("looks".into()).spawn(apply).map_err(no_thread)?;
     // The bus wraps the handler, so it has to start before the socket's server.
     let handler =
-        Controller::create_handler(claim.name().clone(), "stream", Arc::new(rules), Stream { run, look, new_looks });
+        Controller::create_handler(claim.name().clone(), "stream", command_line, Stream { run, look, new_looks });
     #[cfg(feature = "desktop")]
     let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
         Some(Ok((bus, handler))) => (Some(bus), handler),
@@ -198,15 +202,15 @@ impl ControllableRun for Stream {
         Some(self.run.shutter.clone())
     }
 
-    fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
+    fn change_look(&self, change: Change) -> Result<Changed, Answer> {
         let mut requested = lock(&self.look);
-        let (look, note) = rules.apply_patch(&patch, &requested, &self.run.facts)?;
+        let (look, note) = requested.change(&change, &self.run.facts).map_err(|error| refuse_look(&error))?;
         if look != *requested {
             // Sending fails only if the stream has just ended.
             let _ = self.new_looks.send(look.clone());
-            *requested = look;
+            requested.clone_from(&look);
         }
-        Ok(note)
+        Ok(Changed { look, note, source: Some((self.run.kind, self.run.depth_from)) })
     }
 
     fn set_depth_source(&self, way: &str) -> Result<(), Answer> {
@@ -226,7 +230,7 @@ impl ControllableRun for Stream {
         let look = lock(&self.look).clone();
         let quality = self.run.stats.quality().or(look.quality);
         let settings = Patch::from_look(&Look { quality, ..look }).values();
-        let source = self.run.facts.kind.name();
+        let source = self.run.kind.name();
         let snapshot = Snapshot { picture: &picture, sources: None, settings: &settings, source };
         let saved = match to {
             Some(path) => snapshot::save_as(path, &snapshot).map(|()| path.to_owned()),

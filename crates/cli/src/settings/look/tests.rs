@@ -6,19 +6,17 @@ use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureSetting, CocRule, Effect, Patch, Refine, SETTINGS, SourceDepth, Strength, Tilt};
+use bokehcam::look::{ApertureSetting, CocRule, Effect, Metres, Patch, Refine, SETTINGS, Strength, Tilt};
 use bokehcam::optics::{CocField, Lens};
-use bokehcam::source::{SourceError, adapt_look};
 
 const SIZE: (u32, u32) = (640, 450);
 
-fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, SourceError> {
+fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, CliError> {
     let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
     let matches = command.try_get_matches_from(flags).unwrap();
     let every = options::Every::from_arg_matches(&matches).unwrap();
-    let look =
-        build_look(&every.blur, &every.computing.quality).map_err(|error| SourceError::Usage(error.to_string()))?;
-    adapt_look(&look, &every.blur.depth, SourceDepth { has_depth, ..SourceDepth::default() })
+    let facts = every.blur.depth.look_facts(has_depth, Metres::Known)?;
+    RequestedLook::new(&every.blur, &every.computing.quality, &GivenSettings::default())?.fit(None, &facts)
 }
 
 fn refusal(flags: &[&str], has_depth: bool) -> String {

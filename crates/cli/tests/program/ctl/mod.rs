@@ -13,8 +13,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bokehcam::budget::Quality;
+use bokehcam::frame::ColorImage;
 use bokehcam::recording::snapshot;
-use bokehcam::recording::still::read_color;
+use bokehcam::recording::still::{read_color, write_color};
 use serde_json::json;
 
 use crate::program::PORTRAIT;
@@ -97,6 +98,39 @@ fn what_follows_depth_is_refused_where_there_is_none() {
     world.ctl(&["preset", "dreamy"]).refused(2, &["--effect auto needs depth", "tilt-shift"]);
     assert_eq!(world.status(&[])["look"]["rim"], "0.2", "nothing of it is done");
     world.ctl(&["preset", "miniature"]).done();
+}
+
+#[test]
+fn what_a_preset_has_in_metres_is_left_out_without_them_and_a_setting_is_refused() {
+    let world = World::new();
+    let plate = ColorImage { rgb: vec![90; 3 * 640 * 360], ..ColorImage::new(640, 360) };
+    write_color(&world.path("here/room.png"), &plate, false).unwrap();
+    let relative = ["--to", "null", "--depth", "plate:room.png"];
+    let left_out = "without effect here: --focus-range 0.3 (distances in metres are unknown)";
+    let start = |more: &[&str]| {
+        let args = [&["stream", PORTRAIT, "--frames", "1"][..], &relative, more].concat();
+        world.run(&args)
+    };
+    assert!(start(&["--preset", "product"]).done().contains(left_out));
+    start(&["--preset", "product", "--focus-range", "0.3"]).failed(2, &["--focus-range 0.3 needs distances"]);
+    let _stream = world.stream("stream", &relative);
+    assert!(world.ctl(&["preset", "product"]).done().contains(left_out));
+    let look = world.status(&[])["look"].clone();
+    assert_eq!(json!([look["blur"], look["focus-range"]]), json!(["1.6%", "0"]));
+    world.ctl(&["set", "focus=1.5"]).refused(2, &["--focus 1.5 needs distances"]);
+    world.ctl(&["set", "rim=0.3"]).done();
+}
+
+#[test]
+fn nothing_is_behind_where_outputs_were_opened_for_it() {
+    let world = World::new();
+    let stream = world.stream("stream", &["--to", "plain/"]);
+    world.ctl(&["set", "behind=transparent"]).refused(2, &["--behind transparent", "FILE.webm"]);
+    assert_eq!(stream.interrupt(), 0);
+    let _stream = world.stream("stream", &["--to", "cut/", "--behind", "transparent"]);
+    for behind in ["behind=blur", "behind=transparent"] {
+        world.ctl(&["set", behind]).done();
+    }
 }
 
 #[test]

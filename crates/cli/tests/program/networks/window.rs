@@ -56,7 +56,7 @@ fn a_source_has_the_ways_to_depth_that_it_brings_and_the_command_names_the_one_t
             "{name}"
         );
         assert!(!opened.depth_methods.contains(&DepthMethod::Plate), "nobody in a recording steps aside");
-        assert!(!opened.camera.is_relative);
+        assert_ne!(opened.camera.metres, bokehcam::look::Metres::Missing);
         // Selecting the default method by name gives the same result.
         let again = system.open(name, Some(usual)).unwrap();
         assert_eq!((again.depth_method, &again.depth_methods), (Some(usual), &opened.depth_methods), "{name}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::{Role, Ui, WidgetInfo};
 
 use super::PanelForm;
-use crate::panel::widgets::{Tooltip, add_dropdown, add_path, add_remark};
+use crate::panel::widgets::{Tooltip, add_dropdown, add_path};
 use crate::services::PathKind;
 use crate::state::Action;
 use crate::texts::{tr, tr_with};
@@ -17,7 +17,6 @@ enum BackgroundKind {
     Color,
     /// A picture or a video.
     File,
-    Transparent,
 }
 
 const KINDS: [(&str, &str, BackgroundKind); 3] = [
@@ -31,10 +30,10 @@ const GREEN: [u8; 3] = [0, 177, 64];
 /// Adds the list of backgrounds.
 pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
     let kind = match form.look.background {
-        Background::Blur => BackgroundKind::Blurred,
+        // A window is never transparent.
+        Background::Blur | Background::Transparent => BackgroundKind::Blurred,
         Background::Color(_) => BackgroundKind::Color,
         Background::Picture(_) | Background::Video(_) => BackgroundKind::File,
-        Background::Transparent => BackgroundKind::Transparent,
     };
     let named = match &form.state.first_look.background {
         file @ (Background::Picture(_) | Background::Video(_)) => Some(file.clone()),
@@ -43,8 +42,6 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
     let shown = match (kind, &form.look.background) {
         (BackgroundKind::File, Background::Video(_)) => tr("Video"),
         (BackgroundKind::File, _) => tr("Picture"),
-        // The command line and presets alone choose this.
-        (BackgroundKind::Transparent, _) => tr("Transparent"),
         (kind, _) => KINDS.iter().find(|(.., of)| *of == kind).map_or("", |(name, ..)| tr(name)),
     };
     let shown = tr_with("Background: {}", &[&shown]);
@@ -57,7 +54,6 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
             (BackgroundKind::Color, _) => form.look.background = Background::Color(GREEN),
             (BackgroundKind::File, Some(named)) => form.look.background = named,
             (BackgroundKind::File, None) => form.push_action(Action::Browse(PathKind::Background)),
-            (BackgroundKind::Transparent, _) => {}
         }
         form.stroke = Some("behind");
     }
@@ -66,12 +62,9 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
 /// Adds the options of the selected background.
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     match form.look.background.clone() {
-        Background::Blur => {}
+        Background::Blur | Background::Transparent => {}
         Background::Video(video) => add_file(ui, form, Some(&video.file.path)),
         Background::Picture(picture) => add_file(ui, form, picture.file.as_deref()),
-        Background::Transparent => {
-            add_remark(ui, "Shown as black here. PNG, WebM and MOV keep the transparency.");
-        }
         Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);

@@ -21,7 +21,7 @@ const MODES: [(&str, &str, bool); 2] = [
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let follows_depth = form.follows_depth();
     let by_lens = matches!(form.look.strength, Strength::Lens(_));
-    if (follows_depth || by_lens) && !form.is_relative() {
+    if (follows_depth || by_lens) && !form.state.lacks_metres() {
         let chosen = add_choice(ui, "Blur by", &MODES, by_lens, |by_lens| !by_lens || follows_depth);
         let focus_m = form.state.focus_distance_m();
         match (chosen, form.look.strength) {
@@ -45,7 +45,7 @@ fn amount_number(ui: &mut Ui, form: &mut PanelForm) {
     let hint = "Radius of a far light, relative to the picture's height. The wheel over the picture does the same";
     let how = Number::new("Amount of blur", hint, 0.0..=MAX_COC_PER_HEIGHT * 100.0, 1).with_affixes("", " %");
     form.add_number(ui, &how, fraction * 100.0, |look, percent| look.strength = Strength::Percent(percent));
-    if form.follows_depth() && form.state.focus_m.is_some() && !form.is_relative() {
+    if form.follows_depth() && form.state.focus_m.is_some() && !form.state.lacks_metres() {
         add_remark(ui, &equivalent_lens(form));
     }
 }

@@ -20,7 +20,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
         FocusRule::Auto | FocusRule::Relative(_) => (false, now_m),
     };
     let point = if is_point { focus } else { FocusRule::Point { x: 0.5, y: 0.5 } };
-    let in_metres = !form.is_relative();
+    let in_metres = !form.state.lacks_metres();
     let by_number = match focus {
         FocusRule::Metres(_) | FocusRule::Relative(_) => focus,
         _ if in_metres => FocusRule::Metres((now_m * 100.0).round() / 100.0),

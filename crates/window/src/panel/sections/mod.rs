@@ -87,11 +87,6 @@ impl PanelForm<'_> {
         self.state.may_have_depth()
     }
 
-    /// Whether depth is relative, without metres; while a source opens, as it was before.
-    fn is_relative(&self) -> bool {
-        self.state.camera.is_relative
-    }
-
     fn follows_depth(&self) -> bool {
         self.look.effect.follows_depth()
     }

@@ -103,7 +103,7 @@ impl Window {
 #[test]
 fn relative_depth_is_focused_at_a_place_from_0_to_1() {
     let mut state = crate::state::sample::state();
-    (state.camera.is_relative, state.focus_m) = (true, Some(4.0));
+    (state.camera.metres, state.focus_m) = (bokehcam::look::Metres::Missing, Some(4.0));
     let mut window = Window::of(state, (1280, 720));
     window.tab_to("Subject");
     for _ in 0..2 {

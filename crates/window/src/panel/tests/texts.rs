@@ -12,7 +12,7 @@ use bokehcam::look::{Effect, FramingZoom, Strength};
 
 /// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 22] = [
+    let changes: [&dyn Fn(&mut State); 21] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -33,7 +33,6 @@ fn windows() -> Vec<Window> {
         &|state| {
             (state.look.background, state.look.follow) = (Background::Color([1, 2, 3]), FramingZoom::from_zoom(2.0));
         },
-        &|state| state.look.background = Background::Transparent,
         &|state| state.help = true,
         &|state| {
             let Source::Running(running) = &mut state.source else { return };
@@ -44,7 +43,7 @@ fn windows() -> Vec<Window> {
                 DepthMethod::PersonAndMonoDepth,
                 DepthMethod::Plate,
             ];
-            (state.camera.is_relative, state.look.focus_range_m) = (true, 0.5);
+            (state.camera.metres, state.look.focus_range_m) = (bokehcam::look::Metres::Missing, 0.5);
         },
         &|state| {
             let Source::Running(running) = &mut state.source else { return };

@@ -37,7 +37,7 @@ impl SessionWorker {
     pub(super) fn effective_look(&self) -> Look {
         self.pipeline
             .as_ref()
-            .map_or_else(|| self.config.look.clone(), |pipeline| pipeline.adapt_look(&self.config.look))
+            .map_or_else(|| self.config.look.clone(), |pipeline| self.config.look.for_source(&pipeline.facts))
     }
 
     /// Holds a frame on the screen.

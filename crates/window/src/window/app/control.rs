@@ -1,7 +1,6 @@
 //! Remote control of the window: its requests run on the window's thread, like user actions.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
 use std::time::{Duration, Instant};
@@ -11,13 +10,13 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use super::App;
 use crate::remote_changes::RemoteChanges;
 use crate::session::SnapshotRequest;
-use crate::state::{Action, DepthMethod, Running, Source};
+use crate::state::{Action, DepthMethod, Source};
 use crate::window::{RemoteConfig, UserEvent};
 use bokehcam::control::{Answer, Server, Status};
-use bokehcam::controller::{ControllableRun, Controller, Rules, SourceFacts};
-use bokehcam::look::{Look, Patch};
+use bokehcam::controller::{Changed, ControllableRun, Controller, refuse_look};
+use bokehcam::look::{Change, Look, Patch};
 use bokehcam::sink::ShutterControl;
-use bokehcam::source::DepthChoice;
+use bokehcam::source::DepthOrigin;
 
 /// Timeout for replies of the window's thread, and for saving pictures.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
@@ -45,13 +44,13 @@ pub(super) struct RemoteControl {
 
 impl RemoteControl {
     pub fn start(
-        RemoteConfig { claim, rules }: RemoteConfig,
+        RemoteConfig { claim, command_line }: RemoteConfig,
         shutter: ShutterControl,
         proxy: &EventLoopProxy<UserEvent>,
     ) -> std::io::Result<Self> {
         let (to, tasks) = mpsc::channel();
         let handle = RemoteHandle { tasks: to, proxy: proxy.clone(), shutter };
-        let handler = Controller::create_handler(claim.name().clone(), "preview", rules, handle);
+        let handler = Controller::create_handler(claim.name().clone(), "preview", command_line, handle);
         Ok(Self { tasks, _server: claim.serve(handler)?, remote_changes: RemoteChanges::default(), request: None })
     }
 
@@ -99,9 +98,8 @@ impl ControllableRun for RemoteHandle {
         Some(self.shutter.clone())
     }
 
-    fn change_look(&self, patch: Patch, rules: &Arc<dyn Rules>) -> Result<Option<String>, Answer> {
-        let rules = Arc::clone(rules);
-        self.run_on_window(move |app, events| app.apply_remote_patch(&patch, &*rules, events))?
+    fn change_look(&self, change: Change) -> Result<Changed, Answer> {
+        self.run_on_window(move |app, events| app.change_look_temporarily(&change, events))?
     }
 
     fn set_depth_source(&self, depth_method: &str) -> Result<(), Answer> {
@@ -129,23 +127,20 @@ impl App {
         }
     }
 
-    /// Applies a temporary look change. Returns a note about settings without effect.
-    fn apply_remote_patch(
-        &mut self,
-        patch: &Patch,
-        rules: &dyn Rules,
-        events: &ActiveEventLoop,
-    ) -> Result<Option<String>, Answer> {
-        let note = match &self.state.source {
-            Source::Running(running) => rules.apply_patch(patch, &self.state.look, &source_facts(running))?.1,
-            _ => None,
-        };
-        let look = self.state.patch_look(patch).map_err(Answer::invalid_request)?;
+    /// Changes the look, and does not save that.
+    fn change_look_temporarily(&mut self, change: &Change, events: &ActiveEventLoop) -> Result<Changed, Answer> {
+        let facts = self.state.look_facts();
+        let (look, note) = self.state.look.change(change, &facts).map_err(|error| refuse_look(&error))?;
         let before = self.state.chosen_look();
-        self.perform_action(Action::Look { look: Box::new(look), stroke: None }, events);
+        self.perform_action(Action::Look { look: Box::new(look.clone()), stroke: None }, events);
         let after = self.state.chosen_look();
         self.remote_control.iter_mut().for_each(|remote| remote.remote_changes.record(&before, &after));
-        Ok(note)
+        let source = match &self.state.source {
+            Source::Running(running) if running.has_depth => Some((running.kind, running.depth_from)),
+            Source::Running(running) => Some((running.kind, DepthOrigin::Nothing)),
+            _ => None,
+        };
+        Ok(Changed { look, note, source })
     }
 
     /// Checks that the source supports this depth method; the error lists those it supports.
@@ -215,10 +210,4 @@ impl App {
             ..Status::default()
         }
     }
-}
-
-/// Returns the source's properties that decide which looks it supports. `DepthChoice::Auto` because declined depth does
-/// not matter here.
-fn source_facts(&Running { kind, size, has_depth, depth_from, .. }: &Running) -> SourceFacts {
-    SourceFacts { kind, size, has_depth, depth_from, depth_choice: DepthChoice::Auto }
 }
