@@ -60,9 +60,7 @@ impl Meaning {
                 let rig = stated.and_then(|stated| stated.rig());
                 if rig.is_none() {
                     notes.push(
-                        "contains disparity without a scale: the order of depth is known, distances are not (`bokehcam \
-                         depth --metres` gives them)"
-                            .to_owned(),
+                        "contains disparity without a scale: the order of depth is known, distances are not".to_owned(),
                     );
                 }
                 let distances = if rig.is_some() { Distances::Metres } else { Distances::Relative };

@@ -196,7 +196,7 @@ fn a_recording_may_have_relative_inverse_depth() {
     let blurred = read_photo(&first.unwrap()).unwrap().0;
     assert!(difference(&picture, &blurred, 0..66) < 0.1 && difference(&picture, &blurred, 94..160) > 5.0);
     for (arguments, code, part) in [
-        (&["--depth-unit", "inverse", "--focus", "1.2"][..], 2, "inverse depth without a scale"),
+        (&["--depth-unit", "inverse", "--focus", "1.2"][..], 2, "--focus 1.2 needs distances"),
         (&["--depth-unit", "inverse", "--depth-scale", "1000", "--quiet"], 0, ""),
         (&["--depth-unit", "inverse", "--depth-scale", "1000"], 0, "relative depth has no scale"),
         (&["--depth-invert"], 1, "depth.txt:1"),

@@ -27,6 +27,8 @@ pub(super) struct Input {
     pub depth_from: DepthOrigin,
     /// Depth that was found in or beside the photo.
     pub found: Option<FoundDepth>,
+    /// What was assumed about a depth map, a line each.
+    pub notes: Vec<String>,
 }
 
 /// Depth that the photo brings without an option for it.
@@ -59,15 +61,15 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
     let own_px = photo.color.size();
     transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;
-    let mut input = Input { photo, depth: None, depth_from: DepthOrigin::Nothing, found: None };
+    let mut input = Input { photo, depth: None, depth_from: DepthOrigin::Nothing, found: None, notes: Vec::new() };
     if let Some((made, from)) = compute_depth(command, look, (&input.photo.color, own_px))? {
         (input.depth, input.depth_from) = (Some(made), from);
     } else if let Some(file) = &command.depth_map {
-        let (mut map, from) = read_depth(file, command, own_px)?;
+        let (mut map, from) = read_depth(file, command, own_px, &mut input.notes)?;
         source::find_person(&command.source_options(), look, &input.photo.color, &mut map);
         (input.depth, input.depth_from) = (Some(Depth::Measured(map)), from);
     } else if let Some(file) = kept_depth {
-        let (map, from) = read_depth(&file, command, own_px)?;
+        let (map, from) = read_depth(&file, command, own_px, &mut input.notes)?;
         (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
     } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
         find_depth(&image, command, look, &mut input)?;
@@ -137,13 +139,18 @@ fn compute_depth(
     }
 }
 
-/// Reads the depth map `file` for a picture that is `own_px` large in its file, and says what was assumed.
+/// Reads the depth map `file` for a picture that is `own_px` large in its file, and notes what was assumed.
 ///
 /// # Errors
 /// The file cannot be read.
-fn read_depth(file: &Path, command: &RenderCommand, own_px: (u32, u32)) -> Result<(DepthMap, DepthOrigin), CliError> {
-    let DepthFile { map, distances, notes } = photo::read_depth_file(file, &command.depth, own_px)?;
-    notes.iter().for_each(|note| log::note(&format!("{}: {note}", file.display())));
+fn read_depth(
+    file: &Path,
+    command: &RenderCommand,
+    own_px: (u32, u32),
+    notes: &mut Vec<String>,
+) -> Result<(DepthMap, DepthOrigin), CliError> {
+    let DepthFile { map, distances, notes: assumed } = photo::read_depth_file(file, &command.depth, own_px)?;
+    notes.extend(assumed.iter().map(|note| format!("{}: {note}", file.display())));
     Ok((command.orientation.transform().transform_map(map, own_px), distances.into()))
 }
 

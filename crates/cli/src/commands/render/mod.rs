@@ -32,8 +32,9 @@ use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::number::whole_number_parser;
-use bokehcam::look::{ApertureSetting, Look, LookFacts, Refine};
+use bokehcam::look::{ApertureSetting, Look, LookError, LookFacts, Refine};
 use bokehcam::names;
+use bokehcam::recording::depth_file::DepthUnit;
 use bokehcam::recording::snapshot;
 use bokehcam::recording::still::PhotoFormat;
 use bokehcam::source::photo;
@@ -186,11 +187,22 @@ struct RenderedFile {
 
 /// Blurs the command's only picture, and writes the result.
 fn render(command: &RenderCommand, requested: &RequestedLook, given: &GivenSettings) -> Result<RenderedFile, CliError> {
-    let Input { mut photo, depth, depth_from, found } = read_input(command, &requested.for_opening())?;
+    let Input { mut photo, depth, depth_from, found, notes } = read_input(command, &requested.for_opening())?;
     let facts = command.blur.depth.look_facts(depth.is_some(), depth_from.metres())?;
     // The format of the result has been checked.
     let facts = LookFacts { size: photo.color.size(), keeps_alpha: true, ..facts };
-    let look = requested.fit(found.as_ref().and_then(|found| found.focus), &facts)?;
+    let look = requested.fit(found.as_ref().and_then(|found| found.focus), &facts);
+    let look = look.map_err(|error| match (error, &command.depth_map) {
+        (CliError::Look(LookError::Unsuited(what)), Some(file)) if depth_from.is_relative() => {
+            let hint = match command.depth.depth_unit {
+                Some(DepthUnit::Inverse) => "",
+                _ => " (disparity becomes metres by `depth --metres`)",
+            };
+            CliError::Usage(format!("{}: {what}{hint}", file.display()))
+        }
+        (error, _) => error,
+    })?;
+    notes.iter().for_each(|line| log::note(line));
     focus::note_place(&requested.look, &look);
     command.warn_of_settings(&look, &photo.color, (depth.as_ref(), depth_from, found.as_ref()), given);
     let computing = command.computing.to_compute_options();
