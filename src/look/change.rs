@@ -94,8 +94,8 @@ impl Patch {
 }
 
 impl Look {
-    /// Returns this look after a change, as far as a run with these `facts` can have it, and a line on what of a preset is
-    /// left out. Without depth, an effect of `auto` that the look has already becomes a uniform blur. In relative depth,
+    /// Returns this look after a change, as far as a run with these `facts` can have it, and a line on what is left
+    /// out. Without depth, an effect of `auto` that the look has already becomes a uniform blur. In relative depth,
     /// a focus from 0 to 1 is a place, and what a preset has in metres is left out.
     ///
     /// # Errors
@@ -118,7 +118,7 @@ impl Look {
                 wanted.focus
             )));
         }
-        let left_out = if follows_depth { change.find_unknown_metres(facts)? } else { Vec::new() };
+        let left_out = if follows_depth { change.find_unknown_metres(&wanted, facts)? } else { Vec::new() };
         // Without an effect by depth, focus and lens wait for one.
         let metres = if is_relative && !follows_depth { Metres::Unknown } else { facts.metres };
         let mut look = wanted.for_source(&LookFacts { metres, ..*facts });
@@ -139,11 +139,12 @@ impl Look {
 }
 
 impl Change {
-    /// Returns its settings in metres that a source with depth does not have.
+    /// Returns the settings in metres of the `wanted` look that a source with depth does not have: with an assumed
+    /// geometry, those of this change alone.
     ///
     /// # Errors
     /// One of them is asked for by itself.
-    fn find_unknown_metres(&self, facts: &LookFacts) -> Result<Vec<Value>, LookError> {
+    fn find_unknown_metres(&self, wanted: &Look, facts: &LookFacts) -> Result<Vec<Value>, LookError> {
         let (relative, instead) = match facts.metres {
             Metres::Missing if facts.has_depth => (
                 true,
@@ -159,7 +160,8 @@ impl Change {
         };
         match self.asked.metric_settings(relative).first() {
             Some((name, value)) => Err(LookError::Unsuited(format!("--{name} {value} needs distances, {instead}"))),
-            None => Ok(self.patch.metric_settings(relative)),
+            None if relative => Ok(Patch::from_look(wanted).metric_settings(true)),
+            None => Ok(self.patch.metric_settings(false)),
         }
     }
 }
@@ -221,10 +223,12 @@ mod tests {
         assert!(set(&[("focus", "0.5")], Metres::Assumed).is_err());
         assert!(set(&[("focus", "0")], Metres::Known).unwrap_err().contains("METRES above 0"));
         assert_eq!(set(&[("focus", "0")], Metres::Unknown).unwrap().0.focus, FocusRule::Relative(0.0), "it waits");
-        // Nothing of a look that another change brings is refused or lost.
+        // A setting of an earlier change is not refused.
         let waiting = set(&[("effect", "blur"), ("focus", "1.5")], Metres::Missing).unwrap().0;
         assert_eq!(waiting.focus, FocusRule::Metres(1.5));
-        assert!(waiting.change(&Change::to_settings(patch(&[("effect", "dof")])), &facts(Metres::Missing)).is_ok());
+        let by_depth = Change::to_settings(patch(&[("effect", "dof")]));
+        let (_, note) = waiting.change(&by_depth, &facts(Metres::Missing)).unwrap();
+        assert!(note.unwrap().contains("--focus 1.5"));
     }
 
     #[test]
