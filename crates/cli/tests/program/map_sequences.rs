@@ -7,7 +7,7 @@ use std::process::Command;
 
 use bokehcam::engine::still;
 use bokehcam::frame::ColorImage;
-use bokehcam::look::{Look, SourceDepth, Strength};
+use bokehcam::look::{Look, LookFacts, Metres, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::recording::DepthUnit;
 use bokehcam::recording::still::{read_color, write_color};
@@ -177,7 +177,9 @@ fn a_focus_without_metres_is_a_place_and_refocusing_keeps_the_lens() {
         let note = format!("--focus {focus}: a place in relative depth, from 0 (nearest) to 1 (farthest)");
         assert!(ran.done().contains(&note), "{}", ran.stderr);
         let look = Look { focus: focus.parse().unwrap(), strength: Strength::AtInfinity(8.0), ..Look::default() };
-        let look = look.for_source(SourceDepth { has_depth: true, is_relative: true, size: (width, height) });
+        let facts =
+            LookFacts { has_depth: true, metres: Metres::Missing, size: (width, height), ..LookFacts::default() };
+        let look = look.for_source(&facts);
         let measured = still::Depth::Measured(map.clone());
         let (field, map) = still::compute_coc_and_depth(&look, &mut checks.clone(), Some(measured), Some(1)).unwrap();
         let CocField::Depth(lens) = field else { panic!("{field:?}") };
