@@ -1,6 +1,6 @@
 //! Depth of a recording for colour frames of another source: paired by media time, played in a loop.
 
-use super::{DepthError, DepthSource, FrameInput};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 

@@ -1,7 +1,7 @@
 //! Depth maps in files of their own, paired with the frames by their number.
 
-use super::{DepthError, DepthSource, FrameInput};
 use crate::calibration::registration::AnySizeRegistration;
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::recording::map_sequence::MapSequence;
 

@@ -36,11 +36,9 @@ pub mod transformed;
 #[cfg(feature = "files")]
 pub mod video;
 
+use std::error::Error;
+
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
-#[cfg(feature = "files")]
-use crate::recording::RecordingError;
-#[cfg(feature = "files")]
-use crate::video::VideoError;
 
 /// Provides the depth map of each frame.
 ///
@@ -119,14 +117,9 @@ pub struct FrameInput<'a> {
 /// Why a frame has no depth.
 #[derive(Debug, thiserror::Error)]
 pub enum DepthError {
-    /// The depth image of a recording cannot be read.
-    #[cfg(feature = "files")]
+    /// A file that has the depth, or makes it, cannot be read.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The video of the depth cannot be read.
-    #[cfg(feature = "files")]
-    #[error(transparent)]
-    Video(#[from] VideoError),
+    File(Box<dyn Error + Send + Sync>),
     /// A depth camera has delivered no map yet. Later frames may have one.
     #[error("{source_name}: no depth yet")]
     Unpaired {
@@ -142,10 +135,6 @@ pub enum DepthError {
         /// Name of the frame source.
         source_name: String,
     },
-    /// A network cannot be loaded.
-    #[cfg(feature = "networks")]
-    #[error(transparent)]
-    Load(#[from] crate::network::NetworkError),
     /// A network failed.
     #[error("{name}: {why}")]
     Network {

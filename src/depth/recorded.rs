@@ -2,9 +2,15 @@
 
 use std::sync::Arc;
 
-use super::{DepthError, DepthSource, FrameInput};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
-use crate::recording::{Recording, Scratch};
+use crate::recording::{Recording, RecordingError, Scratch};
+
+impl From<RecordingError> for DepthError {
+    fn from(error: RecordingError) -> Self {
+        Self::File(error.into())
+    }
+}
 
 /// The depth pictures of a recording.
 pub struct RecordedDepth {

@@ -2,13 +2,19 @@
 
 use std::time::Duration;
 
-use super::{DepthError, DepthSource, FrameInput};
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::recording::depth_covers;
 use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// How long one call of the decoder waits.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+impl From<VideoError> for DepthError {
+    fn from(error: VideoError) -> Self {
+        Self::File(error.into())
+    }
+}
 
 /// Reads the depth of each frame from the frame of the same number of a video: luma is relative inverse depth.
 pub struct VideoDepth {

@@ -12,9 +12,9 @@ use std::time::Duration;
 
 pub use units::Units;
 
-use super::{DepthError, DepthSource, FrameInput};
 use crate::calibration::registration::AnySizeRegistration;
 use crate::clock::Clock;
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::DepthMap;
 use crate::layout::Content;
 use crate::v4l2::live::{LiveDevice, ModeRequest, Next, OpenError};

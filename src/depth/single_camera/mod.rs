@@ -25,13 +25,13 @@ use picture_network::PictureNetwork;
 use relative_depth::RelativeDepth;
 use subject_mask::SubjectMask;
 
-use super::matting::mask::MaskMatting;
-use super::plate::Companion;
-use super::tap::Tap;
-use super::{DepthError, DepthSource, FrameInput};
 use crate::compute::thread_pool::core_count;
+use crate::depth::matting::mask::MaskMatting;
+use crate::depth::plate::Companion;
+use crate::depth::tap::Tap;
+use crate::depth::{DepthError, DepthSource, FrameInput};
 use crate::frame::{ColorImage, DepthMap, Mask};
-use crate::network::{self, Task};
+use crate::network::{self, NetworkError, Task};
 
 /// Interval in frames of the depth network beside persons, per effort level: a room hardly moves. The person network
 /// runs in every frame, since outlines are valid for one frame only.
@@ -42,6 +42,12 @@ const DEPTH_INTERVALS_ALONE: [u64; 3] = [2, 1, 1];
 const EFFORTS: [f64; DEPTH_INTERVALS.len()] = [0.5, 0.8, 1.0];
 /// Frames further apart in media time are unrelated.
 const MAX_GAP_NS: u64 = 500_000_000;
+
+impl From<NetworkError> for DepthError {
+    fn from(error: NetworkError) -> Self {
+        Self::File(error.into())
+    }
+}
 
 /// Depth from networks that run on a camera's pictures.
 pub struct SingleCamera {
