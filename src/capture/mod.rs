@@ -1,5 +1,6 @@
 //! Sources of frames.
 
+pub mod background;
 pub mod demo;
 mod error;
 pub mod photo;

@@ -8,9 +8,7 @@ mod background;
 mod cut_out;
 mod light;
 
-#[cfg(feature = "files")]
-pub use background::BackgroundVideo;
-pub use background::{Background, BackgroundPicture};
+pub use background::{Background, BackgroundPicture, BackgroundVideo};
 pub use cut_out::CutOut;
 use light::LightTables;
 
@@ -155,9 +153,8 @@ impl VirtualBackground {
             Background::Picture(picture) => {
                 scale_to_cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row));
             }
-            #[cfg(feature = "files")]
             Background::Video(video) => {
-                scale_to_cover(&video.first, &mut self.scaled, (&mut self.scale, &mut self.row));
+                scale_to_cover(video.first(), &mut self.scaled, (&mut self.scale, &mut self.row));
             }
             // Premultiplied: where nothing is, there is no light.
             Background::Transparent => self.scaled.rgb.fill(0),
@@ -166,7 +163,6 @@ impl VirtualBackground {
 
     /// Shows another picture behind frames of `size` from now on: the middle of `picture`, which has the
     /// [size to cover](cover_size) them.
-    #[cfg(feature = "files")]
     pub fn show_covering(&mut self, picture: &ColorImage, size: (u32, u32)) {
         self.scale_to_frame(size);
         let [width, height, whole_width, whole_height] =

@@ -5,12 +5,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TryRecvError};
 use std::thread;
 
-use crate::capture::replay::PlayRange;
-use crate::capture::video::Video;
-use crate::capture::{Camera, CaptureError, Captured, FrameBuffers};
-use crate::depth::backdrop::{BackgroundVideo, cover_size};
-use crate::frame::{ColorImage, DepthMap, GrayImage};
-use crate::video::VideoError;
+use crate::depth::backdrop::BackgroundVideo;
+use crate::frame::ColorImage;
 
 /// Pictures that are decoded ahead.
 const AHEAD: usize = 2;
@@ -20,7 +16,7 @@ type Decoded = Result<(u64, ColorImage), String>;
 
 /// A video in a loop, at its own rate against the time of a stream.
 pub(super) struct BackdropPlayer {
-    video: Arc<BackgroundVideo>,
+    video: Arc<dyn BackgroundVideo>,
     pictures: Receiver<Decoded>,
     /// Returns pictures to the decoder, to be overwritten.
     shown: Sender<ColorImage>,
@@ -40,16 +36,16 @@ impl BackdropPlayer {
     ///
     /// # Errors
     /// The system refuses the thread.
-    pub fn start(video: Arc<BackgroundVideo>, size: (u32, u32), waits: bool) -> io::Result<Self> {
+    pub fn start(video: Arc<dyn BackgroundVideo>, size: (u32, u32), waits: bool) -> io::Result<Self> {
         let (to_player, pictures) = mpsc::sync_channel(AHEAD);
         let (shown, free) = mpsc::channel();
         let decoded = Arc::clone(&video);
-        thread::Builder::new().name("behind".into()).spawn(move || decode(&decoded, size, &to_player, &free))?;
+        thread::Builder::new().name("behind".into()).spawn(move || decode(&*decoded, size, &to_player, &free))?;
         Ok(Self { video, pictures, shown, next: None, began_ns: None, waits, has_ended: false })
     }
 
     /// Returns whether it plays this video.
-    pub fn plays(&self, video: &Arc<BackgroundVideo>) -> bool {
+    pub fn plays(&self, video: &Arc<dyn BackgroundVideo>) -> bool {
         Arc::ptr_eq(&self.video, video)
     }
 
@@ -77,7 +73,7 @@ impl BackdropPlayer {
             match received {
                 Ok(Ok(next)) => self.next = Some(next),
                 Ok(Err(why)) => {
-                    tracing::warn!("--behind video:{}: {why}; its last picture stays", self.video.file.path.display());
+                    tracing::warn!("--behind video:{}: {why}; its last picture stays", self.video.file().display());
                     self.has_ended = true;
                 }
                 Err(TryRecvError::Empty) => {}
@@ -89,36 +85,12 @@ impl BackdropPlayer {
 }
 
 /// Decodes a video again and again until its player is gone, or it cannot go on.
-fn decode(video: &BackgroundVideo, size: (u32, u32), to_player: &SyncSender<Decoded>, free: &Receiver<ColorImage>) {
-    let range = PlayRange { looped: true, ..PlayRange::default() };
-    let size_px = cover_size(video.file.size_px, size);
-    let play = || -> Result<(), CaptureError> {
-        let mut camera = Video::open(video.file.clone(), size_px, None, range, true)?;
-        let (mut depth, mut right) = (DepthMap::default(), GrayImage::default());
-        let (mut color, mut last_index) = (ColorImage::default(), None);
-        loop {
-            match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
-                // A single picture needs no second lap.
-                Captured::Frame(stamp) if last_index.replace(stamp.index) == Some(stamp.index) => return Ok(()),
-                Captured::Frame(stamp) => {
-                    let empty = free.try_recv().unwrap_or_default();
-                    if to_player.send(Ok((stamp.time_ns, std::mem::replace(&mut color, empty)))).is_err() {
-                        return Ok(());
-                    }
-                }
-                Captured::Corrupt(error) => return Err(error),
-                Captured::Waiting | Captured::Lost(..) => {}
-                Captured::End => return Ok(()),
-            }
-        }
-    };
-    if let Err(error) = play() {
-        let why = match error {
-            CaptureError::Video(VideoError::Damaged { frames, what, .. }) => {
-                format!("damaged or cut short after {frames} frames: {what}")
-            }
-            other => other.to_string(),
-        };
+fn decode(video: &dyn BackgroundVideo, size: (u32, u32), to_player: &SyncSender<Decoded>, free: &Receiver<ColorImage>) {
+    let played = video.play(size, &mut |time_ns, picture| {
+        let empty = free.try_recv().unwrap_or_default();
+        to_player.send(Ok((time_ns, std::mem::replace(picture, empty)))).is_ok()
+    });
+    if let Err(why) = played {
         // The player may be gone.
         let _ = to_player.send(Err(why));
     }

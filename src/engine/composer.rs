@@ -1,7 +1,6 @@
 //! Composes the subject: virtual background and auto-framing.
 
 use super::Images;
-#[cfg(feature = "files")]
 use super::backdrop_player::BackdropPlayer;
 use crate::depth::backdrop::{Background, VirtualBackground};
 use crate::depth::follow::AutoFraming;
@@ -47,24 +46,15 @@ pub(super) struct Composer {
     backdrop: Option<VirtualBackground>,
     follower: Option<AutoFraming>,
     playback: Playback,
-    #[cfg(feature = "files")]
     player: Option<BackdropPlayer>,
     /// The video's picture, as large as it is decoded.
-    #[cfg(feature = "files")]
     picture: ColorImage,
 }
 
 impl Composer {
     pub fn new(look: &Look, playback: Playback) -> Self {
-        let mut composer = Self {
-            backdrop: None,
-            follower: None,
-            playback,
-            #[cfg(feature = "files")]
-            player: None,
-            #[cfg(feature = "files")]
-            picture: ColorImage::default(),
-        };
+        let mut composer =
+            Self { backdrop: None, follower: None, playback, player: None, picture: ColorImage::default() };
         composer.set_look(look);
         composer
     }
@@ -93,7 +83,6 @@ impl Composer {
     }
 
     /// Shows the picture of a video that is due at `time_ns`, behind frames of `size`.
-    #[cfg(feature = "files")]
     fn play_video(&mut self, size: (u32, u32), time_ns: u64) {
         let Self { backdrop: Some(backdrop), playback, player, picture, .. } = self else { return };
         let Background::Video(video) = backdrop.background() else { return };
@@ -130,7 +119,6 @@ impl Composer {
         time_ns: u64,
     ) -> Option<Crop> {
         let CocField::Depth(lens) = field else { return None };
-        #[cfg(feature = "files")]
         self.play_video(color.size(), time_ns);
         let crop = self.follower.as_mut().map(|follower| follower.update_crop(map, lens, time_ns));
         if let Some(backdrop) = &mut self.backdrop {

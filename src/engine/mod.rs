@@ -8,7 +8,6 @@
 // Some items are only used by the threads of a run.
 #![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports))]
 
-#[cfg(feature = "files")]
 mod backdrop_player;
 mod blur;
 mod coc;

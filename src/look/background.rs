@@ -6,8 +6,8 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use super::LookError;
-use crate::depth::backdrop::{Background, BackgroundPicture, BackgroundVideo};
-use crate::recording::still::read_color;
+use super::files::readers_for;
+use crate::depth::backdrop::{Background, BackgroundPicture};
 
 /// The background behind the subject as a setting.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +71,7 @@ impl fmt::Display for BackgroundSetting {
         match self {
             Self::Image(file) => write!(f, "image:{}", file.display()),
             Self::Video(file) => write!(f, "video:{}", file.display()),
-            Self::Loaded(Background::Video(video)) => write!(f, "video:{}", video.file.path.display()),
+            Self::Loaded(Background::Video(video)) => write!(f, "video:{}", video.file().display()),
             Self::Loaded(Background::Transparent) => f.write_str("transparent"),
             Self::Loaded(Background::Blur) => f.write_str("blur"),
             Self::Loaded(Background::Color([red, green, blue])) => write!(f, "color:#{red:02x}{green:02x}{blue:02x}"),
@@ -97,7 +97,7 @@ impl BackgroundSetting {
         match self {
             Self::Image(file) | Self::Video(file) => Some(file),
             Self::Loaded(Background::Picture(picture)) => picture.file.as_deref(),
-            Self::Loaded(Background::Video(video)) => Some(&video.file.path),
+            Self::Loaded(Background::Video(video)) => Some(video.file()),
             Self::Loaded(_) => None,
         }
     }
@@ -115,9 +115,10 @@ impl BackgroundSetting {
         Ok(match self {
             Self::Loaded(behind) => behind.clone(),
             Self::Image(file) => {
-                Background::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image: read_color(file)? }))
+                let image = (readers_for(file)?.picture)(file)?;
+                Background::Picture(Arc::new(BackgroundPicture { file: Some(file.clone()), image }))
             }
-            Self::Video(file) => Background::Video(Arc::new(BackgroundVideo::open(file)?)),
+            Self::Video(file) => Background::Video((readers_for(file)?.video)(file)?),
         })
     }
 }

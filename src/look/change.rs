@@ -1,13 +1,13 @@
 //! Changes of a look, as far as a run can have them: one rule for the command line, remote control, the window and other
 //! programs.
 
+use std::error::Error;
+
 use super::settings::LENS_SETTINGS;
 use super::{Effect, Look, LookFacts, Metres, Patch, Strength, Value};
 use crate::bokeh::BokehError;
 use crate::depth::backdrop::Background;
 use crate::depth::focus::FocusRule;
-use crate::recording::RecordingError;
-use crate::video::VideoError;
 
 /// An error in the settings of a look.
 #[derive(Debug, thiserror::Error)]
@@ -31,10 +31,10 @@ pub enum LookError {
     Blur(#[from] BokehError),
     /// A picture cannot be read.
     #[error(transparent)]
-    Picture(#[from] RecordingError),
+    Picture(Box<dyn Error + Send + Sync>),
     /// A video behind the subject cannot be read.
     #[error("--behind: {0}")]
-    Video(#[from] VideoError),
+    Video(Box<dyn Error + Send + Sync>),
 }
 
 impl LookError {

@@ -11,6 +11,8 @@ mod background;
 mod change;
 mod coc;
 mod effect;
+#[cfg(feature = "files")]
+mod files;
 mod follow;
 pub mod number;
 #[cfg(feature = "files")]
@@ -31,6 +33,8 @@ pub use background::BackgroundSetting;
 pub use change::{Change, LookError};
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine, Reuse};
+#[cfg(feature = "files")]
+pub use files::{FileReaders, register_readers};
 pub use follow::FramingZoom;
 #[cfg(feature = "files")]
 pub use patch::Value;

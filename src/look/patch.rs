@@ -171,7 +171,7 @@ impl Patch {
             (None, _) => {}
             (Some(BackgroundSetting::Image(file)), Background::Picture(picture))
                 if picture.file.as_ref() == Some(file) => {}
-            (Some(BackgroundSetting::Video(file)), Background::Video(video)) if video.file.path == *file => {}
+            (Some(BackgroundSetting::Video(file)), Background::Video(video)) if video.file() == *file => {}
             (Some(name), _) => look.background = name.load()?,
         }
         if let Some(intensity) = self.intensity {

@@ -19,6 +19,7 @@ mod error;
 mod external_depth;
 #[cfg(feature = "networks")]
 pub mod installed;
+mod look_files;
 pub mod modes;
 mod name;
 mod networks;
@@ -33,6 +34,7 @@ mod suggestion;
 pub mod video;
 
 pub use error::SourceError;
+pub use look_files::register_look_files;
 pub use name::{Kind, SourceName};
 pub use networks::{find_person, installed_networks};
 use opened::Opened;

@@ -1,15 +1,10 @@
 //! What can be behind the subject.
 
-#[cfg(feature = "files")]
-use std::path::Path;
-use std::path::PathBuf;
+use std::fmt;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-#[cfg(feature = "files")]
-use std::time::Duration;
 
 use crate::frame::ColorImage;
-#[cfg(feature = "files")]
-use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// What to show behind the subject.
 #[derive(Clone, Debug, Default)]
@@ -22,8 +17,7 @@ pub enum Background {
     /// A picture, scaled to cover the frame and cropped equally on both sides.
     Picture(Arc<BackgroundPicture>),
     /// A video, scaled like a picture and played in a loop.
-    #[cfg(feature = "files")]
-    Video(Arc<BackgroundVideo>),
+    Video(Arc<dyn BackgroundVideo>),
     /// Nothing: results have an alpha channel.
     Transparent,
 }
@@ -44,51 +38,24 @@ impl PartialEq for Background {
             (Self::Color(a), Self::Color(b)) => a == b,
             // Compares identity, not content: this comparison runs often.
             (Self::Picture(a), Self::Picture(b)) => Arc::ptr_eq(a, b),
-            #[cfg(feature = "files")]
             (Self::Video(a), Self::Video(b)) => Arc::ptr_eq(a, b),
             _ => false,
         }
     }
 }
 
-/// A video for a virtual background.
-#[cfg(feature = "files")]
-#[derive(Debug)]
-pub struct BackgroundVideo {
-    /// The file.
-    pub file: VideoFile,
-    /// Its first picture, at most 4096 pixels a side.
-    pub first: ColorImage,
-}
+/// A video for a virtual background, decoded above the engine, which knows no file format.
+pub trait BackgroundVideo: fmt::Debug + Send + Sync {
+    /// Returns the file.
+    fn file(&self) -> &Path;
 
-/// Largest side of a video's first picture, in pixels.
-#[cfg(feature = "files")]
-const MAX_FIRST_PX: u32 = 4096;
+    /// Returns the first picture.
+    fn first(&self) -> &ColorImage;
 
-/// How long one call of the decoder waits.
-#[cfg(feature = "files")]
-const PATIENCE: Duration = Duration::from_millis(100);
-
-#[cfg(feature = "files")]
-impl BackgroundVideo {
-    /// Opens a video file, and decodes its first picture.
+    /// Decodes the pictures in a loop, scaled to cover frames of `size`. Hands each to `show`, which may take it, with
+    /// its time in nanoseconds since the first, until `show` returns false. A single picture is handed over once.
     ///
     /// # Errors
-    /// The file is missing, not a video, or has no picture that can be decoded; ffmpeg is missing.
-    pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let file = VideoFile::open(path)?;
-        let scale = (f64::from(MAX_FIRST_PX) / f64::from(file.size_px.0.max(file.size_px.1))).min(1.0);
-        let [width, height] =
-            [file.size_px.0, file.size_px.1].map(|side| ((f64::from(side) * scale).round() as u32).max(1));
-        let conversion = Conversion { size_px: (width, height), pixels: Pixels::Rgb24, fps: None, start_s: 0.0 };
-        let mut decoder = Decoder::start(&file, &conversion)?;
-        let mut first = ColorImage::new(width, height);
-        loop {
-            match decoder.read(&mut first.rgb, PATIENCE)? {
-                Decoded::Picture(_) => return Ok(Self { file, first }),
-                Decoded::Waiting => {}
-                Decoded::End => return Err(VideoError::NoVideo { path: path.to_owned() }),
-            }
-        }
-    }
+    /// Why there are no more pictures.
+    fn play(&self, size: (u32, u32), show: &mut dyn FnMut(u64, &mut ColorImage) -> bool) -> Result<(), String>;
 }

@@ -4,7 +4,7 @@ use std::fs;
 
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::recording::still::{
-    read_color, read_depth, read_grey, read_photo, write_color, write_depth, write_photo,
+    read_aperture, read_color, read_depth, read_grey, read_photo, write_color, write_depth, write_photo,
 };
 use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, Rgb, RgbaImage};
 use tempfile::TempDir;
@@ -112,6 +112,19 @@ fn wrong_pictures_are_told_with_their_name() {
         read_depth(&path, 5000.0, None),
         &["picture.png: an 8-bit grey picture", "inverse if white is near", "scale:N"],
     );
+}
+
+#[test]
+fn a_picture_that_lets_no_light_through_is_no_aperture() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("black.png");
+    let mut picture = ColorImage::new(5, 5);
+    write_color(&file, &picture, false).unwrap();
+    let error = read_aperture(&file).unwrap_err().to_string();
+    assert!(error.contains("black.png: it is black all over"), "{error}");
+    picture.rgb[36] = 200;
+    write_color(&file, &picture, true).unwrap();
+    assert!(read_aperture(&file).is_ok());
 }
 
 #[test]

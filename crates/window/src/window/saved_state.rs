@@ -88,7 +88,7 @@ impl SavedState {
         let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
         let mut is_missing = |read: Result<(), LookError>| read.map_err(|error| on_missing(error.to_string())).is_err();
         patch.behind = patch.behind.filter(|name| !is_missing(name.load().map(drop)));
-        patch.aperture = patch.aperture.filter(|name| !is_missing(name.load().map(drop).map_err(LookError::from)));
+        patch.aperture = patch.aperture.filter(|name| !is_missing(name.load().map(drop)));
         patch.apply_to(&Look::default()).ok()
     }
 
@@ -140,6 +140,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_and_nonsense_is_nothing() {
+        bokehcam::source::register_look_files();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/window.toml");
         assert_eq!(SavedState::read(&path), None);

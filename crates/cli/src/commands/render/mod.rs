@@ -161,7 +161,7 @@ fn request_look(command: &RenderCommand, given: &GivenSettings) -> Result<Reques
     let requested = RequestedLook::new(&command.blur, &command.computing.quality, given)?;
     let look = &requested.look;
     if let Background::Video(video) = &look.background {
-        log::note(&format!("--behind video:{}: a picture shows its first frame", video.file.path.display()));
+        log::note(&format!("--behind video:{}: a picture shows its first frame", video.file().display()));
     }
     Ok(requested)
 }

@@ -96,6 +96,7 @@ fn the_range_of_focus_reaches_the_lens() {
 
 /// Returns looks that differ from the default in one field each, in every form of that field.
 fn looks(picture: &std::path::Path) -> Vec<Look> {
+    bokehcam::source::register_look_files();
     let plain = Look::default();
     let mut looks = vec![plain.clone()];
     let mut add = |change: &dyn Fn(&mut Look)| {

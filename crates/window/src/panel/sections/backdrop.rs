@@ -63,7 +63,7 @@ pub fn add_background_choice(ui: &mut Ui, form: &mut PanelForm) {
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     match form.look.background.clone() {
         Background::Blur | Background::Transparent => {}
-        Background::Video(video) => add_file(ui, form, Some(&video.file.path)),
+        Background::Video(video) => add_file(ui, form, Some(video.file())),
         Background::Picture(picture) => add_file(ui, form, picture.file.as_deref()),
         Background::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
