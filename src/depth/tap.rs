@@ -3,8 +3,11 @@
 /// Two neighbouring samples and the weight of the second.
 #[derive(Clone, Copy, Debug)]
 pub struct Tap {
+    /// Index of the first.
     pub first: usize,
+    /// Index of the second.
     pub second: usize,
+    /// Weight of the second, 0 to 1.
     pub weight: f32,
 }
 

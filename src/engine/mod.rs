@@ -29,7 +29,9 @@ use crate::look::{Effect, Look};
 
 /// Both halves of the engine, on the same device.
 pub(crate) struct Engine {
+    /// Its first half.
     pub preprocessor: Preprocessor,
+    /// Its second half.
     pub blur: Blur,
 }
 

@@ -49,6 +49,7 @@ pub(crate) struct Input {
     pub size: (u32, u32),
     /// The number of frames, if known.
     pub frames: Option<u64>,
+    /// The origin of their depth.
     pub depth: Origin,
     /// Whether the depth source provides the background behind the nearer surface, so that none is remembered.
     pub knows_background: bool,

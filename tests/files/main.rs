@@ -4,6 +4,7 @@
 mod examples;
 mod layering;
 mod licences;
+mod matching;
 mod promises;
 mod recording;
 mod scripts;

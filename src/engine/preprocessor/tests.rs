@@ -4,14 +4,17 @@ use super::*;
 use crate::depth::backdrop::Background;
 use crate::depth::focus::FocusRule;
 use crate::look::Strength;
-use crate::recording::still::{read_color, read_depth};
 
 const PERIOD_NS: u64 = 33_333_333;
 
 fn portrait() -> (ColorImage, DepthMap) {
-    let file = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait").join(name);
-    let color = read_color(&file("rgb/000000.png")).unwrap();
-    (color, read_depth(&file("depth/000000.png"), 5000.0, None).unwrap())
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let open = |name: &str| image::open(folder.join(name)).unwrap();
+    let (color, units) = (open("rgb/000000.png").into_rgb8(), open("depth/000000.png").into_luma16());
+    let (width, height) = color.dimensions();
+    let metres = units.pixels().map(|units| f32::from(units.0[0]) / 5000.0).collect();
+    let color = ColorImage { width, height, rgb: color.into_raw() };
+    (color, DepthMap { width, height, metres, ..DepthMap::default() })
 }
 
 /// Returns a map whose near objects are wider by 4 pixels on each side.
