@@ -9,8 +9,7 @@ mod window;
 
 pub use governor::{Governor, PredictedTimes};
 pub use load::{MAX_LEVELS, Sample};
-#[cfg(feature = "files")]
-pub(crate) use planner::DEADLINE_PERIODS;
+pub use planner::DEADLINE_PERIODS;
 pub use planner::{DepthTimes, Plan, Planner};
 pub use quality::Quality;
 pub use window::Window;

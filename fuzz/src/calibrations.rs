@@ -1,8 +1,8 @@
 //! Targets for stereo calibrations, and for calibrations of a depth camera next to a colour camera.
 
+use bokehcam::calibration::CameraIntrinsics;
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::registration::{Registration, RgbdCalibration};
-use bokehcam::calibration::{self, CameraIntrinsics};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam_cli::parsers;
 
@@ -12,8 +12,10 @@ use super::input::{assert_one_line, file_path, split_files, write_file};
 pub fn calibration(data: &[u8]) {
     let (one, two) = ("intrinsics.yml", "other.yml");
     let read = match split_files(data).as_slice() {
-        [only] => calibration::load_calibration(&[&write_file(one, only)]),
-        [left, right, ..] => calibration::load_calibration(&[&write_file(one, left), &write_file(two, right)]),
+        [only] => bokehcam_media::calibration::load_calibration(&[&write_file(one, only)]),
+        [left, right, ..] => {
+            bokehcam_media::calibration::load_calibration(&[&write_file(one, left), &write_file(two, right)])
+        }
         [] => return,
     };
     let rig = match read {

@@ -1,8 +1,8 @@
 //! Targets for camera input: format descriptions of drivers, raw pixels, and Motion-JPEG.
 
-use bokehcam::capture::pixels::Decoder;
 use bokehcam::frame::ColorImage;
-use bokehcam::v4l2::{FourCc, Layout};
+use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::v4l2::{FourCc, Layout};
 use v4l::v4l_sys as sys;
 
 use super::input::{Numbers, assert_one_line};
@@ -34,7 +34,7 @@ fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
 pub fn raw_pixels(data: &[u8]) {
     let mut numbers = Numbers(data);
     let format = build_format(&mut numbers);
-    let layout = match Layout::from_format(&format) {
+    let layout = match bokehcam_live::v4l2::layout::from_format(&format) {
         Ok(layout) => layout,
         Err(error) => return assert_one_line(error),
     };

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
-use bokehcam::recording::depth_file::{self, DepthUnit, Fit, Options};
-use bokehcam::recording::{Photo, PhotoMetadata, embedded, snapshot as snapshots, still};
+use bokehcam_media::recording::depth_file::{self, DepthUnit, Fit, Options};
+use bokehcam_media::recording::{Photo, PhotoMetadata, embedded, snapshot as snapshots, still};
 
 use super::input::{assert_one_line, file_path, write_file};
 

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::{DepthUnit, Options, Recording, Scratch, still};
+use bokehcam_media::recording::{DepthUnit, Options, Recording, Scratch, still};
 
 use super::input::{assert_one_line, file_path, split_files, write_file};
 

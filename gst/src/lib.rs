@@ -16,7 +16,7 @@ mod settings;
 use gst::glib;
 
 fn plugin_init(plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
-    bokehcam::source::register_look_files();
+    bokehcam_live::source::register_look_files();
     bokeh::register(plugin)
 }
 

@@ -1,10 +1,10 @@
 //! Conversion of pictures in GStreamer's memory to sRGB and back, by the library.
 
-use bokehcam::capture::pixels::Decoder;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam::layout::{ColorEncoding, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
-use bokehcam::sink::raw::Encoder;
+use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::sink::raw::Encoder;
+use bokehcam_media::layout::{ColorEncoding, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
 use gst_video::prelude::*;
 use gst_video::{VideoColorMatrix, VideoColorRange, VideoFormat, VideoFrameRef, VideoInfo};
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::recording::still;
+use bokehcam_media::recording::still;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 

@@ -39,7 +39,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        bokehcam::source::register_look_files();
+        bokehcam_live::source::register_look_files();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

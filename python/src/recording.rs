@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::{self, Options, RecordingError, Scratch};
+use bokehcam_media::recording::{self, Options, RecordingError, Scratch};
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 

@@ -7,7 +7,7 @@ use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::look::{Change, Look, LookFacts, Metres, Refine};
-use bokehcam::recording::still::check_depth_size;
+use bokehcam_media::recording::still::check_depth_size;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
 use pyo3::prelude::*;
 

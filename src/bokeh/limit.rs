@@ -40,7 +40,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`BokehError::Memory`].
-    pub(crate) fn check_memory(size: (u32, u32), extra_bytes_per_pixel: u64) -> Result<(), BokehError> {
+    pub fn check_memory(size: (u32, u32), extra_bytes_per_pixel: u64) -> Result<(), BokehError> {
         let pixels = u64::from(size.0) * u64::from(size.1);
         let is_banded = pixels > MAX_WHOLE_PIXELS as u64;
         let bytes_per_pixel = if is_banded { BANDED_BYTES_PER_PIXEL } else { BYTES_PER_PIXEL };

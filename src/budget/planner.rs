@@ -18,7 +18,7 @@ const FINER_BLUR_PENALTY: f64 = -0.4;
 const COARSER_BLUR_PENALTIES: [f64; 3] = [0.0, 3.0, 7.0];
 
 /// Deadline of a frame, in periods after its capture.
-pub(crate) const DEADLINE_PERIODS: u64 = 2;
+pub const DEADLINE_PERIODS: u64 = 2;
 /// Fraction of the deadline at which the blur must be finished: the rest is for delivery and jitter.
 const DEADLINE_FRACTION: f64 = 0.8;
 /// Depth handles one frame at a time: its average time may take at most this fraction of the period.

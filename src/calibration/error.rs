@@ -1,23 +1,15 @@
 //! Errors of calibrations: what is wrong, where, and what to do about it, in one line.
 
 use std::fmt;
-#[cfg(feature = "files")]
-use std::io;
 use std::path::{Path, PathBuf};
-
-#[cfg(feature = "files")]
-use super::formats;
-#[cfg(feature = "files")]
-use crate::files::input::format_io_error;
 
 /// Error of reading or using a calibration.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The file cannot be read.
-    #[cfg(feature = "files")]
-    #[error("cannot read the calibration {}: {}", path.display(), format_io_error(source))]
-    Io { path: PathBuf, source: io::Error },
+    #[error("cannot read the calibration {}: {why}", path.display())]
+    Io { path: PathBuf, why: String },
     /// The format of the file is unknown.
     #[error("{}: not a stereo calibration that is read{hint}; the formats are {formats}", path.display())]
     Unknown {
@@ -91,15 +83,6 @@ pub enum CalibrationError {
     /// The views of the cameras overlap too little.
     #[error("the cameras look in too different directions: their pictures overlap too little")]
     LittleOverlap,
-}
-
-#[cfg(feature = "files")]
-impl CalibrationError {
-    /// Returns the error of a file of unknown format.
-    pub(crate) fn unknown_format(path: &Path) -> Self {
-        let hint = formats::find_similar(path).unwrap_or_default();
-        Self::Unknown { path: path.to_owned(), hint, formats: formats::list_formats() }
-    }
 }
 
 /// Fault of an entry.

@@ -7,7 +7,7 @@ const MAX_TILT_RAD: f64 = 0.5;
 
 /// What is wrong with the coefficients of a lens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LensFault {
+pub enum LensFault {
     /// The model needs another number of them.
     Count(&'static str),
     /// The sensor would be tilted too far.
@@ -18,7 +18,7 @@ pub(crate) enum LensFault {
 
 impl Distortion {
     /// Returns the distortion of the lens model that calibrations call `model`, with these coefficients.
-    pub(crate) fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, LensFault> {
+    pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, LensFault> {
         match model.to_ascii_lowercase().replace('_', "-").as_str() {
             // ROS writes no coefficients, and at times no model, for pictures without distortion.
             "none" | "" | "plumb-bob" if coefficients.is_empty() => Ok(Self::RadialTangential([0.0; 8])),

@@ -3,7 +3,7 @@
 //! Each pixel has the index of the upper left of its four neighbours and two fractions in 1/256 pixel, 0 to 256. The
 //! four weights sum to 256, so that an identity map keeps every bit.
 //!
-//! twin: shaders/stereo_rectify.wgsl
+//! twin: shaders/stereo/rectify.wgsl
 
 use std::ops::Range;
 

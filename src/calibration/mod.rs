@@ -1,48 +1,21 @@
 //! Stereo calibration: intrinsics and lens of both cameras, the pose between them, and the rectification of their
 //! pictures.
 //!
-//! [`load_calibration`] reads a [`StereoCalibration`]; [`rectifier::Rectifier`] turns its pictures into a rectified
+//! [`rectifier::Rectifier`] turns its pictures into a rectified
 //! pair. [`registration::Registration`] reprojects depth into the view of a colour camera.
 
-#[cfg(feature = "files")]
-mod entries;
 mod error;
-#[cfg(feature = "files")]
-pub mod euroc;
-#[cfg(feature = "files")]
-pub mod formats;
-#[cfg(feature = "files")]
-mod ini;
-#[cfg(feature = "files")]
-mod kalibr;
 pub mod lens;
-#[cfg(feature = "files")]
 mod lens_model;
 pub mod map;
-#[cfg(feature = "files")]
-mod oak;
-#[cfg(feature = "files")]
-mod opencv;
 pub mod rectification;
 pub mod rectifier;
 pub mod registration;
-#[cfg(feature = "files")]
-mod ros;
-#[cfg(feature = "files")]
-mod stored;
-#[cfg(feature = "files")]
-mod tree;
-#[cfg(feature = "files")]
-mod yaml;
-#[cfg(feature = "files")]
-mod zed;
-
-#[cfg(feature = "files")]
-use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 pub use error::{CalibrationError, Fault};
+pub use lens_model::LensFault;
 use rectification::Rectification;
 
 /// Lens distortion of a pinhole camera.
@@ -97,7 +70,6 @@ pub enum LengthUnit {
 }
 
 /// A longer translation without a unit is in millimetres.
-#[cfg(feature = "files")]
 const MAX_BASELINE_M: f64 = 2.0;
 /// Baselines that are plausible for a translation without a unit, taken as metres.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.005..=0.5;
@@ -105,89 +77,20 @@ const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.005..=0.5;
 /// centimetres or in squares of the chessboard.
 const MIN_PLAUSIBLE_MM: f64 = 20.0;
 
-#[cfg(feature = "files")]
 impl LengthUnit {
     /// Returns the unit to assume for a translation of this length.
-    fn assume(length: f64) -> Self {
+    pub fn assume(length: f64) -> Self {
         if length > MAX_BASELINE_M { Self::AssumedMillimetres } else { Self::AssumedMetres }
     }
 
     /// Returns the unit in metres.
-    fn metres(self) -> f64 {
+    pub fn metres(self) -> f64 {
         if self == Self::AssumedMillimetres { 1e-3 } else { 1.0 }
     }
 }
 
 /// Relative difference up to which aspects count as equal: sizes are in whole pixels.
 const ASPECT_TOLERANCE: f64 = 0.01;
-
-/// Reads a calibration like [`load_calibration_for`], for pictures of unknown size: from a file for several sizes, the
-/// largest.
-///
-/// # Errors
-/// Fails like [`load_calibration_for`].
-#[cfg(feature = "files")]
-pub fn load_calibration(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
-    load_calibration_for(paths, None)
-}
-
-/// Reads a calibration for pictures of `size` (columns, rows). The content decides which of the [`formats::FORMATS`] it
-/// is. Where one has two files, one suffices if the other is beside it: `intrinsics.yml` and `extrinsics.yml`, or
-/// `left.yaml` and `right.yaml` of ROS.
-///
-/// # Errors
-/// Fails if a file is unreadable, of unknown format, or lacks a key, or if numbers are invalid.
-#[cfg(feature = "files")]
-pub fn load_calibration_for(paths: &[&Path], size: Option<(u32, u32)>) -> Result<StereoCalibration, CalibrationError> {
-    if !(1..=2).contains(&paths.len()) {
-        return Err(CalibrationError::Files(paths.len()));
-    }
-    let mut files = Vec::with_capacity(2);
-    for path in paths {
-        files.push(tree::File::open(path)?);
-    }
-    let has = |key| files[0].root().get(key).is_some();
-    let one_camera = |format| Err(CalibrationError::OneCamera { path: paths[0].to_owned(), format });
-    match files.as_slice() {
-        [left, right] if has("T_BS") => return euroc::from_files(left, right),
-        [_] if has("T_BS") => return one_camera("sensor.yaml"),
-        [chain, ..] if has("cam0") || has("cam1") => return kalibr::from_file(chain),
-        [conf, ..] if zed::is_conf(conf) => return zed::from_file(conf, size),
-        [json, ..] if has("cameraData") => return oak::from_file(json),
-        [one, other] if ros::is_camera_info(one) => return ros::from_files(one, other),
-        [one] if ros::is_camera_info(one) => {
-            return match find_companion_file(paths[0], ["left", "right"]) {
-                Some(other) => ros::from_files(one, &tree::File::open(&other)?),
-                None => one_camera("camera_info"),
-            };
-        }
-        _ => {}
-    }
-    if !opencv::is_opencv(&files) {
-        let is_orb_slam = |file: &tree::File| file.root().find(|key| ORB_SLAM_KEYS.contains(&key)).is_some();
-        return Err(match files.iter().any(is_orb_slam) {
-            true => CalibrationError::Unconverted { path: paths[0].to_owned(), format: "ORB-SLAM's format" },
-            false => CalibrationError::unknown_format(paths[0]),
-        });
-    }
-    let companion = find_companion_file(paths[0], ["intrinsic", "extrinsic"]);
-    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), companion) {
-        files.push(tree::File::open(&other)?);
-    }
-    opencv::from_files(&files)
-}
-
-/// Entries of ORB-SLAM's settings.
-#[cfg(feature = "files")]
-const ORB_SLAM_KEYS: [&str; 3] = ["Camera1.fx", "Camera.fx", "LEFT.K"];
-
-/// Returns the file beside `path` with the second word for the first in its name, or the other way round, if it exists.
-#[cfg(feature = "files")]
-fn find_companion_file(path: &Path, [one, other]: [&str; 2]) -> Option<PathBuf> {
-    let name = path.file_name()?.to_str()?;
-    let companion = if name.contains(one) { name.replace(one, other) } else { name.replace(other, one) };
-    Some(path.with_file_name(&companion)).filter(|companion| companion != path && companion.is_file())
-}
 
 impl StereoCalibration {
     /// Returns half of the rotation between the cameras: applied in the right camera's axes, and its inverse in the
@@ -314,8 +217,7 @@ impl CameraIntrinsics {
     ///
     /// # Errors
     /// Same as for [`StereoCalibration::scale_to`].
-    #[cfg(feature = "files")]
-    pub(crate) fn scaled_to(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
+    pub fn scaled_to(&self, size: (u32, u32)) -> Result<Self, CalibrationError> {
         self.scale_factor(size).map(|scale| self.scaled(size, scale))
     }
 

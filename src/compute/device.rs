@@ -27,15 +27,24 @@ pub struct Shader {
     pub source: &'static str,
 }
 
-/// Builds a [`Shader`] from a file under `shaders/`, prefixed by the shared files, the common one first.
+/// Builds a [`Shader`] from a file in a folder under `shaders/`, prefixed by the shared files of the folder, the common one
+/// first. Its name begins with the folder's, except for the blur.
 macro_rules! shader {
-    ($common:literal; $name:literal $(, $shared:literal)*) => {
+    (blur: $common:literal; $name:literal $(, $shared:literal)*) => {
+        $crate::compute::device::shader!($name, "blur", $common, $name $(, $shared)*)
+    };
+    ($folder:ident: $common:literal; $name:literal $(, $shared:literal)*) => {
+        $crate::compute::device::shader!(
+            concat!(stringify!($folder), "_", $name), stringify!($folder), $common, $name $(, $shared)*
+        )
+    };
+    ($pass:expr, $folder:expr, $common:literal, $name:literal $(, $shared:literal)*) => {
         $crate::compute::device::Shader {
-            name: $name,
+            name: $pass,
             source: concat!(
-                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $common, ".wgsl")),
-                $(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $shared, ".wgsl")),)*
-                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl")),
+                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $folder, "/", $common, ".wgsl")),
+                $(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $folder, "/", $shared, ".wgsl")),)*
+                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $folder, "/", $name, ".wgsl")),
             ),
         }
     };

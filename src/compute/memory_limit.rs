@@ -64,7 +64,7 @@ impl MemoryLimit {
     }
 
     /// Counts a request; does not return if it is too much.
-    pub(crate) fn add(&self, bytes: usize) {
+    pub fn add(&self, bytes: usize) {
         let added = isize::try_from(bytes).unwrap_or(isize::MAX);
         let used = self.used_bytes.fetch_add(added, Ordering::Relaxed).saturating_add(added);
         let is_too_much = bytes > self.max_bytes || usize::try_from(used).is_ok_and(|used| used > self.max_bytes);

@@ -6,7 +6,7 @@
 //!
 //! Holes are found once, as runs of pixels along rows; later steps access only their pixels and the adjacent ones.
 //!
-//! twin: shaders/refine_beside.wgsl, shaders/refine_fill.wgsl
+//! twin: shaders/refine/beside.wgsl, shaders/refine/fill.wgsl
 
 use std::ops::Range;
 use std::{iter, mem};

@@ -4,7 +4,7 @@
 //! include hair and shoulders. Where the near and the far side of a hole differ in colour, the near side grows into the
 //! hole as long as the pixels' colour is closer to its own (seeded region growing).
 //!
-//! twin: shaders/refine_claim.wgsl, shaders/refine_agree.wgsl
+//! twin: shaders/refine/claim.wgsl, shaders/refine/agree.wgsl
 
 use std::ops::Range;
 

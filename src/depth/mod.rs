@@ -9,32 +9,20 @@ pub mod background;
 mod bitmap;
 pub mod constant;
 pub mod defocus;
-mod dilation;
+pub mod dilation;
 pub mod fill;
 pub mod focus;
 pub mod follow;
 mod guided_fill;
-#[cfg(feature = "camera")]
-pub mod live;
-#[cfg(feature = "files")]
-pub mod looped_recording;
-#[cfg(feature = "files")]
-pub mod map_sequence;
 pub mod matting;
 pub mod misalignment;
 pub mod motion;
 pub mod plate;
-#[cfg(feature = "files")]
-pub mod recorded;
 mod reduced;
 pub mod refine;
-#[cfg(feature = "networks")]
-pub mod single_camera;
 pub mod stereo;
-mod tap;
+pub mod tap;
 pub mod transformed;
-#[cfg(feature = "files")]
-pub mod video;
 
 use std::error::Error;
 

@@ -13,7 +13,7 @@ use crate::optics::CocField;
 
 /// The time that a frame may take.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TimeBudget<'a> {
+pub struct TimeBudget<'a> {
     /// Time for the blur of one frame, in nanoseconds.
     pub budget_ns: u64,
     /// Frame period in nanoseconds if frames come in real time; then there is a deadline as well.
@@ -50,7 +50,7 @@ pub struct Blur {
     backends: Option<&'static str>,
     rule: QualityRule,
     /// Picks the quality of the next frame from the times of earlier ones.
-    pub(crate) picker: QualityPicker,
+    pub picker: QualityPicker,
 }
 
 impl Default for Blur {
@@ -61,7 +61,7 @@ impl Default for Blur {
 
 impl Blur {
     /// Creates a blur with an executor that supports all qualities of `rule`.
-    pub(crate) fn new(executor: Option<Box<dyn Bokeh>>, rule: QualityRule, time: TimeBudget) -> Self {
+    pub fn new(executor: Option<Box<dyn Bokeh>>, rule: QualityRule, time: TimeBudget) -> Self {
         let picker = QualityPicker::new((rule, finest_quality(executor.as_deref())), time);
         let backends = executor.as_deref().map(Bokeh::backends);
         Self { executor, executor_settings: None, backends, rule, picker }
@@ -90,7 +90,7 @@ impl Blur {
     }
 
     /// Replaces the executor. Neither the old nor the new one may have frames in flight.
-    pub(crate) fn replace_executor(&mut self, executor: Option<Box<dyn Bokeh>>, rule: QualityRule) {
+    pub fn replace_executor(&mut self, executor: Option<Box<dyn Bokeh>>, rule: QualityRule) {
         (self.backends, self.rule) = (executor.as_deref().map(Bokeh::backends), rule);
         self.picker = self.picker.with_rule(rule, finest_quality(executor.as_deref()));
         self.executor = executor;
@@ -98,7 +98,7 @@ impl Blur {
 
     /// Describes the executor for the report: its backends ([`Bokeh::backends`]) and one more line
     /// ([`Bokeh::describe`]).
-    pub(crate) fn describe_executor(&self) -> [String; 2] {
+    pub fn describe_executor(&self) -> [String; 2] {
         self.executor.as_ref().map_or_else(
             || ["none".to_owned(), "none".to_owned()],
             |executor| [executor.backends().to_owned(), executor.describe()],
@@ -107,7 +107,7 @@ impl Blur {
 
     /// Returns whether the executor has moved to another backend (GPU to CPU) since the last call. The finest quality
     /// and the times differ there, so the picker starts anew.
-    pub(crate) fn has_changed_backend(&mut self) -> bool {
+    pub fn has_changed_backend(&mut self) -> bool {
         let backends = self.executor.as_deref().map(Bokeh::backends);
         let has_changed_backend = mem::replace(&mut self.backends, backends) != backends;
         if has_changed_backend {
@@ -127,17 +127,17 @@ impl Blur {
     }
 
     /// Returns how many frames may be in flight at once, at least one.
-    pub(crate) fn capacity(&self) -> usize {
+    pub fn capacity(&self) -> usize {
         self.executor.as_ref().map_or(1, |executor| executor.capacity().max(1))
     }
 
     /// [`Bokeh::submit`].
-    pub(crate) fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+    pub fn submit(&mut self, job: Job) -> Result<(), BokehError> {
         self.executor.as_mut().ok_or(BokehError::Lost)?.submit(job)
     }
 
     /// [`Bokeh::collect`].
-    pub(crate) fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
+    pub fn collect(&mut self, wait: bool) -> Result<Option<BlurredFrame>, BokehError> {
         self.executor.as_mut().map_or(Ok(None), |executor| executor.collect(wait))
     }
 

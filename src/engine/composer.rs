@@ -11,7 +11,7 @@ use crate::optics::CocField;
 
 /// A picture and its depth before its background was replaced.
 #[derive(Default)]
-pub(crate) struct OriginalFrame {
+pub struct OriginalFrame {
     color: ColorImage,
     map: DepthMap,
 }
@@ -32,7 +32,7 @@ impl OriginalFrame {
 
 /// How a video behind the subject is played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Playback {
+pub enum Playback {
     /// Its first picture stays.
     Still,
     /// At the times of the frames, which wait for it.

@@ -5,9 +5,6 @@
 //! has its own thread; a [`FrameProcessor`] runs both on the caller's thread, frame by frame, and [`still`] does so for a
 //! single picture.
 
-// Some items are only used by the threads of a run.
-#![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports))]
-
 mod backdrop_player;
 mod blur;
 mod coc;
@@ -18,17 +15,17 @@ mod preprocessor;
 mod quality;
 pub mod still;
 
-pub(crate) use blur::TimeBudget;
+pub use blur::TimeBudget;
 pub use blur::{Blur, Images};
 pub use coc::{CocCalculator, Postprocess};
-pub(crate) use composer::{OriginalFrame, Playback};
+pub use composer::{OriginalFrame, Playback};
 pub use frame_processor::FrameProcessor;
-pub(crate) use preprocessor::{Composed, Input, Origin, Preprocessor};
+pub use preprocessor::{Composed, Input, Origin, Preprocessor};
 
 use crate::look::{Effect, Look};
 
 /// Both halves of the engine, on the same device.
-pub(crate) struct Engine {
+pub struct Engine {
     /// Its first half.
     pub preprocessor: Preprocessor,
     /// Its second half.

@@ -19,7 +19,7 @@ const EXACT_DEPTH_NOTE: &str = "none, as depth is exact";
 
 /// Where depth comes from, which decides how it is postprocessed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Origin {
+pub enum Origin {
     /// It is complete already.
     Finished,
     /// It belongs to a single picture and its origin is unknown: if the look leaves it open, it is refined only if it
@@ -44,7 +44,7 @@ impl Origin {
 
 /// Properties of the incoming frames.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Input {
+pub struct Input {
     /// Width and height of the pictures, in pixels.
     pub size: (u32, u32),
     /// The number of frames, if known.
@@ -61,7 +61,7 @@ pub(crate) struct Input {
 
 /// The result of virtual background and auto-framing.
 #[derive(Default)]
-pub(crate) struct Composed {
+pub struct Composed {
     /// The crop to show; `None` is the whole picture.
     pub crop: Option<Crop>,
     /// The frame before its background was replaced, if it was and the original is kept.
@@ -74,7 +74,7 @@ pub(crate) struct Composed {
 }
 
 /// Preprocesses frames one after another.
-pub(crate) struct Preprocessor {
+pub struct Preprocessor {
     input: Input,
     /// The postprocessing that the look asks for.
     postprocess: Postprocess,

@@ -6,7 +6,7 @@ use crate::budget::{DepthTimes, Plan, Planner, Quality, Sample};
 use crate::look::QualityRule;
 
 /// Picks the quality of each frame, and the effort of its depth, from the time available.
-pub(crate) struct QualityPicker {
+pub struct QualityPicker {
     /// The levels to pick from, cheapest first.
     levels: &'static [Quality],
     planner: Planner,

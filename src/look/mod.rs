@@ -3,42 +3,29 @@
 //! A [`Look`] is data: the table [`settings`] reads and writes it, and a [`Patch`] changes parts of it. For pictures of
 //! one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
 
-#[cfg(feature = "files")]
 mod aperture;
-#[cfg(feature = "files")]
 mod background;
-#[cfg(feature = "files")]
 mod change;
 mod coc;
 mod effect;
-#[cfg(feature = "files")]
 mod files;
 mod follow;
 pub mod number;
-#[cfg(feature = "files")]
 mod patch;
-#[cfg(feature = "files")]
 pub mod presets;
-#[cfg(feature = "files")]
 pub mod settings;
 mod source_depth;
 mod strength;
 mod tilt;
 
-#[cfg(feature = "files")]
 pub use aperture::ApertureSetting;
-#[cfg(feature = "files")]
 pub use background::BackgroundSetting;
-#[cfg(feature = "files")]
 pub use change::{Change, LookError};
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine, Reuse};
-#[cfg(feature = "files")]
 pub use files::{FileReaders, register_readers};
 pub use follow::FramingZoom;
-#[cfg(feature = "files")]
 pub use patch::Value;
-#[cfg(feature = "files")]
 pub use settings::{Patch, SETTINGS};
 pub use source_depth::{LookFacts, Metres};
 pub use strength::Strength;

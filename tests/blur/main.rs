@@ -10,7 +10,6 @@ mod on_gpu;
 mod portrait;
 
 mod banded;
-mod ladder;
 mod laws;
 mod laws_random;
 mod occlusion;
@@ -19,4 +18,3 @@ mod reuse;
 mod shaders;
 mod shared_frame;
 mod slices;
-mod yuyv;

@@ -8,14 +8,14 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use bokehcam::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
-use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::compute::Backend;
 use bokehcam::compute::GpuError;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
-use bokehcam::sink::{Ending, Sink, SinkError};
-use bokehcam::stats::DropCause;
+use bokehcam_live::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
+use bokehcam_live::sink::{Ending, Sink, SinkError};
+use bokehcam_live::stats::DropCause;
 
 pub const SIZE: (u32, u32) = (6, 4);
 pub const PERIOD_NS: u64 = 1_000_000;

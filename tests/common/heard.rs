@@ -6,13 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bokehcam::capture::Seeker;
 use bokehcam::depth::plate::Guide;
-use bokehcam::files::user_folders::Folders;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::{Look, Strength};
-use bokehcam::pipeline::View;
+use bokehcam_live::capture::Seeker;
+use bokehcam_live::pipeline::View;
+use bokehcam_media::files::user_folders::Folders;
 use bokehcam_window::services::Services;
 use bokehcam_window::session::{Session, SessionConfig, SessionEvent, Still};
 use bokehcam_window::state::Update;

@@ -12,12 +12,10 @@ mod portrait;
 mod room;
 
 mod background;
-mod calibration;
 mod depth;
 mod matcher;
 mod matte_gpu;
 mod matting;
-mod pair_check;
 mod plate;
 mod rectify_gpu;
 mod refine;

@@ -1,13 +1,9 @@
-//! Files that are read and written, and rules for the source itself.
+//! Rules for the source itself, its scripts and its documents.
 #![allow(missing_docs)]
 
 mod examples;
 mod layering;
 mod licences;
-mod matching;
 mod promises;
-mod recording;
 mod scripts;
-mod sinks;
 mod style;
-mod video;

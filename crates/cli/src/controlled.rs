@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::error::CliError;
 use crate::settings::file::SettingsFile;
 use crate::settings::unused::{self, FrameOrigin, RunFacts};
-use bokehcam::control::{self, Answer, Claim, ControlError, Name};
-use bokehcam::controller::CommandLine;
 use bokehcam::look::{Patch, presets};
+use bokehcam_live::control::{self, Answer, Claim, ControlError, Name};
+use bokehcam_live::controller::CommandLine;
 
 /// Claims a name for a run. Without a folder for sockets the run continues, and the inner error is the line to log
 /// later.

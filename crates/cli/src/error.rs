@@ -7,15 +7,15 @@ use std::process::ExitCode;
 
 use bokehcam::bokeh::BokehError;
 use bokehcam::calibration::CalibrationError;
-use bokehcam::capture::CaptureError;
 use bokehcam::compute::panic_message;
 use bokehcam::depth::DepthError;
-use bokehcam::files::input;
 use bokehcam::look::LookError;
-use bokehcam::pipeline::Fault;
-use bokehcam::recording::RecordingError;
-use bokehcam::sink::SinkError;
-use bokehcam::source::SourceError;
+use bokehcam_live::capture::CaptureError;
+use bokehcam_live::pipeline::Fault;
+use bokehcam_live::sink::SinkError;
+use bokehcam_live::source::SourceError;
+use bokehcam_media::files::input;
+use bokehcam_media::recording::RecordingError;
 
 /// Error of a command.
 #[allow(missing_docs)] // The messages name the fields.
@@ -100,7 +100,7 @@ pub enum CliError {
     /// The name matches no device.
     #[error(transparent)]
     #[cfg(feature = "camera")]
-    Node(#[from] bokehcam::v4l2::node::NodeError),
+    Node(#[from] bokehcam_live::v4l2::node::NodeError),
     /// The file is not a video device.
     #[error("{}: this is not a video device", .0.display())]
     #[cfg(feature = "camera")]

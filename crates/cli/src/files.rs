@@ -7,9 +7,9 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::log;
-use bokehcam::files::input::find_special_file_kind;
-use bokehcam::files::{atomic_file, place};
-use bokehcam::recording::still::{self, PhotoFormat};
+use bokehcam_media::files::input::find_special_file_kind;
+use bokehcam_media::files::{atomic_file, place};
+use bokehcam_media::recording::still::{self, PhotoFormat};
 
 /// Returns the picture format for the name of a result, the value of the option `what`.
 ///

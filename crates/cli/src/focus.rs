@@ -5,8 +5,8 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::{CocRule, Look};
 use bokehcam::optics::{CocField, DepthCoc};
-use bokehcam::source::DepthOrigin;
-use bokehcam::source::options::DEPTH_SCALE;
+use bokehcam_live::source::DepthOrigin;
+use bokehcam_live::source::options::DEPTH_SCALE;
 
 /// Says that the number of a focus is `taken` as a place in relative depth.
 pub fn note_place(given: &Look, taken: &Look) {

@@ -33,7 +33,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = arguments::join_negative_numbers(args);
     #[cfg(feature = "lab")]
     bokehcam_lab::synthetic::register();
-    bokehcam::source::register_look_files();
+    bokehcam_live::source::register_look_files();
     log::install_panic_hook();
     log::set_format(arguments::log_format(&args));
     finish(|| run_command(&args))

@@ -44,4 +44,4 @@ pub fn parse_settings(path: &Path, text: &str) -> Result<(), CliError> {
 }
 
 #[cfg(feature = "camera")]
-pub use bokehcam::source::registration::parse_calibration as depth_calibration;
+pub use bokehcam_live::source::registration::parse_calibration as depth_calibration;

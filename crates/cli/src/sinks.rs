@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicBool;
 use super::error::CliError;
 use super::files::refuse_overwriting_source;
 use super::options::{Stream, Streaming};
-use bokehcam::files::place;
 use bokehcam::look::BackgroundSetting;
-use bokehcam::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
-use bokehcam::source::{DepthChoice, Frames, SourceName, video};
+use bokehcam_live::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
+use bokehcam_live::source::{DepthChoice, Frames, SourceName, video};
+use bokehcam_media::files::place;
 
 /// Refuses sinks that collide with each other or with an input, and options that need other sinks.
 ///

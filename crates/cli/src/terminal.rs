@@ -15,7 +15,7 @@ pub use super::log::print_to_stderr;
 use super::options::Global;
 use super::screen::{ProgressCount, Screen};
 use bokehcam::depth::plate::{Guide, Step};
-use bokehcam::stats::Report;
+use bokehcam_live::stats::Report;
 
 /// Returns a flag that the first Ctrl-C (or termination signal) sets, so that the file in hand is finished; the second
 /// ends the program at once.
@@ -48,7 +48,7 @@ pub fn stop_flag_between(items: &'static str) -> Result<Arc<AtomicBool>, CliErro
         is_stopping.store(true, Ordering::Relaxed);
         // A hanging network must not delay the end.
         #[cfg(feature = "networks")]
-        bokehcam::network::shorten_timeouts();
+        bokehcam_media::network::shorten_timeouts();
         #[cfg(feature = "gpu")]
         bokehcam::compute::device::begin_shutdown();
         print_to_stderr(&format!("stopping after the current {items}; press Ctrl-C again to abort"));

@@ -3,9 +3,9 @@
 
 use std::time::Instant;
 
-use bokehcam::capture::pixels::Decoder;
 use bokehcam::frame::ColorImage;
-use bokehcam::v4l2::{FourCc, Layout};
+use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::v4l2::{FourCc, Layout};
 
 const SIZE: (u32, u32) = (1280, 720);
 const ROUNDS: usize = 60;

@@ -15,7 +15,7 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{CocAtInfinity, CocRule};
-use bokehcam::recording::{Options as Reading, Recording, Scratch};
+use bokehcam_media::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 
 /// The variants: the postprocessing, and whether the background is remembered. Each includes all of the previous one.

@@ -12,12 +12,12 @@ use std::time::Instant;
 
 use bokehcam::clock::process_cpu_ns;
 use bokehcam::depth::plate::{Companion, PlateDepth};
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::Task;
-use bokehcam::recording::{self, Recording, Scratch};
-use bokehcam::source::installed::find_best_in;
+use bokehcam_live::source::installed::find_best_in;
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::Task;
+use bokehcam_media::recording::{self, Recording, Scratch};
 use clap::Parser;
 use image::imageops::{FilterType, resize};
 

@@ -18,7 +18,7 @@ use bokehcam::engine::{CocCalculator, Postprocess};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Effect, Look, Reuse};
 use bokehcam::optics::CocField;
-use bokehcam::recording::{Options as Reading, Recording, Scratch};
+use bokehcam_media::recording::{Options as Reading, Recording, Scratch};
 use clap::Parser;
 
 #[derive(Parser)]

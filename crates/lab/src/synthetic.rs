@@ -1,8 +1,8 @@
 //! The project's own scene as a camera with exact depth.
 
-use bokehcam::capture::synthetic::{self, Format};
-use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::frame::Stamp;
+use bokehcam_live::capture::synthetic::{self, Format};
+use bokehcam_live::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 
 use crate::scene::{Scene, View};
 

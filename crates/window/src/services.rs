@@ -2,10 +2,10 @@
 
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
-use bokehcam::camera_control::CameraControl;
 use bokehcam::look::{Look, presets::Preset};
-use bokehcam::sink::{self, Sink};
-use bokehcam::source::{Source, devices::Choice};
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::sink::{self, Sink};
+use bokehcam_live::source::{Source, devices::Choice};
 
 /// A command-line option that is not part of the look: name and value.
 pub type CliOption = (String, String);

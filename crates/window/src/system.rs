@@ -11,14 +11,14 @@ use super::dialog;
 use super::services::{CliOption, FileChooser, OpenedSource, PathKind, Services, SettingsStore};
 use super::state::{Camera, DepthMethod};
 use bokehcam::bokeh::{self, Bokeh};
-use bokehcam::camera_control::CameraControl;
-use bokehcam::capture::demo;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::look::{Effect, Look};
-use bokehcam::recording::{Options as Reading, Recording};
-use bokehcam::sink::{self, Sink, Target};
-use bokehcam::source::devices::{self, CameraWatch, Choice};
-use bokehcam::source::{self, DepthChoice, Kind, Options, SingleCameraDepth, Size, Source, SourceName, modes};
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::capture::demo;
+use bokehcam_live::sink::{self, Sink, Target};
+use bokehcam_live::source::devices::{self, CameraWatch, Choice};
+use bokehcam_live::source::{self, DepthChoice, Kind, Options, SingleCameraDepth, Size, Source, SourceName, modes};
+use bokehcam_media::recording::{Options as Reading, Recording};
 
 /// Shown if there is no camera, and the demonstration replaces it.
 const NO_CAMERA: &str = "No camera was found.";

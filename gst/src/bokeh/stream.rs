@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use bokehcam::engine::FrameProcessor;
 use bokehcam::look::{Change, Effect, Look, LookFacts, Metres};
-use bokehcam::recording::depth_covers;
+use bokehcam_media::recording::depth_covers;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 

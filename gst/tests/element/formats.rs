@@ -1,12 +1,12 @@
 //! Formats and their colours: the output equals the library's conversions of the input, to the bit.
 
-use bokehcam::capture::pixels::Decoder;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::engine::FrameProcessor;
 use bokehcam::frame::ColorImage;
-use bokehcam::layout::{FourCc, Layout, Plane, Range, Transfer};
 use bokehcam::look::{Effect, Look};
-use bokehcam::sink::raw::Encoder;
+use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::sink::raw::Encoder;
+use bokehcam_media::layout::{FourCc, Layout, Plane, Range, Transfer};
 use gst::prelude::*;
 use gst_video::VideoInfo;
 

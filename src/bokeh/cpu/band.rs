@@ -1,7 +1,7 @@
 //! Pass `bin`: converts the picture to linear light, multiplies each pixel by its weight in every bin, and averages the
 //! premultiplied result down to the bin's scale, with the coarse grid. The picture is read once for all bins.
 //!
-//! twin: shaders/bin.wgsl
+//! twin: shaders/blur/bin.wgsl
 
 use std::ops::Range;
 

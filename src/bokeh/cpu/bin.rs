@@ -1,6 +1,6 @@
 //! One bin in the pass `bin`: adds rows of the picture to rows of the bin and its cells.
 //!
-//! twin: shaders/bin.wgsl, shaders/tent.wgsl
+//! twin: shaders/blur/bin.wgsl, shaders/blur/tent.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 

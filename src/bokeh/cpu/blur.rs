@@ -4,7 +4,7 @@
 //! The radius is sampled at the edges of segments of `SEGMENT` pixels, and the taps are linear between them, so that
 //! the blur varies without steps.
 //!
-//! twin: shaders/blur_rows.wgsl, shaders/blur_columns.wgsl
+//! twin: shaders/blur/blur_rows.wgsl, shaders/blur/blur_columns.wgsl
 
 #![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
 

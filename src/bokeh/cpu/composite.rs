@@ -1,6 +1,6 @@
 //! Pass `composite`: combines the blurred bins, front to back, into one picture of the input's pixel kind.
 //!
-//! twin: shaders/composite.wgsl, shaders/surfaces.wgsl
+//! twin: shaders/blur/composite.wgsl, shaders/blur/surfaces.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 

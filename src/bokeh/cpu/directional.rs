@@ -2,7 +2,7 @@
 //! Bertalmio et al., *Image Inpainting*, SIGGRAPH 2000, section 3). Works at a quarter of the picture's size, which is
 //! fine enough.
 //!
-//! twin: shaders/directional.wgsl
+//! twin: shaders/blur/directional.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and directions index several arrays at once.
 

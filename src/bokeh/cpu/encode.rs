@@ -1,6 +1,6 @@
 //! Conversion of linear light to codes: 8-bit sRGB, or 16 bits with any tone curves.
 //!
-//! twin: shaders/composite.wgsl (`code_of`)
+//! twin: shaders/blur/composite.wgsl (`code_of`)
 
 #![allow(clippy::needless_range_loop)] // Columns index several arrays at once.
 

@@ -6,7 +6,7 @@
 //! behind it. Each layer is inpainted separately, from pixels that are not in front of it: behind a head are the trees,
 //! and behind both the sky.
 //!
-//! twin: shaders/find_occluders.wgsl, pull.wgsl, coarse.wgsl, fill.wgsl
+//! twin: shaders/blur/find_occluders.wgsl, pull.wgsl, coarse.wgsl, fill.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 

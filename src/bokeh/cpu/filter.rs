@@ -6,7 +6,7 @@
 //! at -j and j share one multiplication. The loops are written for registers: a value is loaded once and used by all
 //! terms of its group, because the loads limit these passes, not the multiplications.
 //!
-//! twin: shaders/filter.wgsl, shaders/blur_rows.wgsl, shaders/blur_columns.wgsl
+//! twin: shaders/blur/filter.wgsl, shaders/blur/blur_rows.wgsl, shaders/blur/blur_columns.wgsl
 
 #![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
 

@@ -2,7 +2,7 @@
 //! ignoring depth discontinuities. Separable (passes `blur`; McGraw, eq. 2), or exact in two dimensions (pass
 //! `gather`).
 //!
-//! twin: shaders/gather.wgsl
+//! twin: shaders/blur/gather.wgsl
 
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;

@@ -5,7 +5,7 @@
 //! uncovered rest has the colour of the hindmost bin. Away from all silhouettes a pixel shows only one surface, which
 //! is opaque: the bins that the surface spans fill the pixel together.
 //!
-//! twin: shaders/surfaces.wgsl
+//! twin: shaders/blur/surfaces.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 

@@ -1,6 +1,6 @@
 //! Kernels of the image pyramid of the pass `fill`, some rows at a time (pull-push).
 //!
-//! twin: shaders/pyramid.wgsl, pull.wgsl, coarse.wgsl
+//! twin: shaders/blur/pyramid.wgsl, pull.wgsl, coarse.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 

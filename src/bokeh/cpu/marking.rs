@@ -1,6 +1,6 @@
 //! Marks the silhouettes of a frame: CoC discontinuities between neighbouring pixels, and mixed pixels.
 //!
-//! twin: shaders/silhouette.wgsl, shaders/unpack.wgsl
+//! twin: shaders/blur/silhouette.wgsl, shaders/blur/unpack.wgsl
 
 use pulp::{Simd, WithSimd};
 

@@ -1,7 +1,7 @@
 //! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the mean radius of the content within the
 //! filter support, weighted by coverage and nearness, and the range of its colours.
 //!
-//! twin: shaders/reach.wgsl
+//! twin: shaders/blur/reach.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and distances index several arrays at once.
 

@@ -5,7 +5,7 @@
 //! from a silhouette than the radius there. Each discontinuity marks this distance on a coarse grid; the marks are then
 //! dilated.
 //!
-//! twin: shaders/dilate_rows.wgsl, shaders/dilate_columns.wgsl
+//! twin: shaders/blur/dilate_rows.wgsl, shaders/blur/dilate_columns.wgsl
 
 #![allow(clippy::needless_range_loop)] // Lanes index two arrays at once.
 

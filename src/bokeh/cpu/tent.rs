@@ -1,7 +1,7 @@
 //! Weighted pixels of a row, and the tent filter that downscales them: twice as wide as a bin pixel, which preserves
 //! the centroid.
 //!
-//! twin: shaders/tent.wgsl
+//! twin: shaders/blur/tent.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes index several arrays at once.
 

@@ -1,6 +1,6 @@
 //! Unpacking: pixels to linear light with highlights expanded, and depth to signed CoC.
 //!
-//! twin: shaders/unpack.wgsl, shaders/radii.wgsl
+//! twin: shaders/blur/unpack.wgsl, shaders/blur/radii.wgsl
 
 use std::ops::Range;
 

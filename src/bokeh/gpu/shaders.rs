@@ -14,34 +14,34 @@ use crate::bokeh::split::CROSS_FADE;
 use crate::compute::device::{Shader, shader};
 
 /// Empties the tile lists.
-pub const CLEAR: Shader = shader!("common"; "clear", "list");
+pub const CLEAR: Shader = shader!(blur: "common"; "clear", "list");
 /// 8-bit sRGB to linear light, with the CoC.
-pub const UNPACK: Shader =
-    shader!("common"; "unpack", "radii", "silhouette", "cells", "range", "mixed", "list", "tiles", "next", "meet");
+pub const UNPACK: Shader = shader!(blur: "common"; "unpack", "radii", "silhouette", "cells", "range", "mixed", "list", "tiles", "next", "meet");
 /// Dilation of the silhouettes along rows.
-pub const DILATE_ROWS: Shader = shader!("common"; "dilate_rows", "cells");
+pub const DILATE_ROWS: Shader = shader!(blur: "common"; "dilate_rows", "cells");
 /// Dilation of the silhouettes down columns.
-pub const DILATE_COLUMNS: Shader = shader!("common"; "dilate_columns", "cells");
+pub const DILATE_COLUMNS: Shader = shader!(blur: "common"; "dilate_columns", "cells");
 /// Weighted pixels of each bin, and the coarse grid over it.
-pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
+pub const BIN: Shader = shader!(blur: "common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
-pub const REACH: Shader = shader!("common"; "reach", "work");
-pub const BLUR_ROWS: Shader = shader!("common"; "blur_rows", "filter", "node", "list", "tiles", "todo", "next");
-pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
+pub const REACH: Shader = shader!(blur: "common"; "reach", "work");
+pub const BLUR_ROWS: Shader = shader!(blur: "common"; "blur_rows", "filter", "node", "list", "tiles", "todo", "next");
+pub const BLUR_COLUMNS: Shader =
+    shader!(blur: "common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.
-pub const GATHER: Shader = shader!("common"; "gather", "node");
+pub const GATHER: Shader = shader!(blur: "common"; "gather", "node");
 /// CoC of the nearest surface.
-pub const FIND_OCCLUDERS: Shader = shader!("common"; "find_occluders", "mixed");
+pub const FIND_OCCLUDERS: Shader = shader!(blur: "common"; "find_occluders", "mixed");
 /// Pull-push: the known background at half size and over ever larger areas.
-pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base", "mixed");
+pub const PULL: Shader = shader!(blur: "common"; "pull", "pyramid", "base", "mixed");
 /// Pull-push: the coarsest levels, and back.
-pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
+pub const COARSE: Shader = shader!(blur: "common"; "coarse", "pyramid");
 /// Directional inpainting.
-pub const DIRECTIONAL: Shader = shader!("common"; "directional", "pyramid");
+pub const DIRECTIONAL: Shader = shader!(blur: "common"; "directional", "pyramid");
 /// Push to the picture.
 pub const FILL: Shader =
-    shader!("common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
-pub const COMPOSITE: Shader = shader!("common"; "composite", "surfaces", "cells", "list", "yuyv");
+    shader!(blur: "common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
+pub const COMPOSITE: Shader = shader!(blur: "common"; "composite", "surfaces", "cells", "list", "yuyv");
 
 pub const ALL: [Shader; 15] = [
     CLEAR,

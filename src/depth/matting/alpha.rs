@@ -1,6 +1,6 @@
 //! Alpha of mixed pixels: the posterior mean, from the likelihood of the colour and a prior from the depth map
 //! (Bayesian matting, Chuang et al. 2001).
-//! twin: shaders/matte_compare.wgsl, matte_prior.wgsl, matte_weights.wgsl
+//! twin: shaders/matte/compare.wgsl, matte/prior.wgsl, matte/weights.wgsl
 
 #![allow(clippy::needless_range_loop)] // Steps and pixels index several arrays at once.
 

@@ -1,5 +1,5 @@
 //! Colour contrast of two surfaces: alpha of a colour between them, and the colours that make up a mixed pixel.
-//! twin: shaders/matte_contrast.wgsl, matte_mix.wgsl
+//! twin: shaders/matte/contrast.wgsl, matte/mix.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and pixels index several arrays at once.
 

@@ -1,5 +1,5 @@
 //! Edge detection: pixels beside depth discontinuities.
-//! twin: shaders/matte_find_edges.wgsl, matte_edges.wgsl
+//! twin: shaders/matte/find_edges.wgsl, matte/edges.wgsl
 
 use std::ops::Range;
 

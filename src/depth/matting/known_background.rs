@@ -1,7 +1,7 @@
 //! The remembered background behind pixels.
 
 /// A remembered background picture, which may be hidden now.
-/// twin: shaders/matte_background.wgsl
+/// twin: shaders/matte/background.wgsl
 #[derive(Clone, Copy, Debug)]
 pub struct KnownBackground<'a> {
     /// 8-bit sRGB, 3 bytes a pixel.

@@ -1,5 +1,5 @@
 //! The per-pixel steps, vectorised.
-//! twin: shaders/matte_compare.wgsl, matte_weigh.wgsl, matte_mix.wgsl
+//! twin: shaders/matte/compare.wgsl, matte/weigh.wgsl, matte/mix.wgsl
 
 use pulp::WithSimd;
 

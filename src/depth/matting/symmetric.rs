@@ -1,5 +1,5 @@
 //! Symmetric 3x3 matrices and vectors, for covariances of colours.
-//! twin: shaders/matte_contrast.wgsl
+//! twin: shaders/matte/contrast.wgsl
 
 /// A symmetric matrix: xx, xy, xz, yy, yz, zz.
 pub type Symmetric = [f32; 6];

@@ -1,5 +1,5 @@
 //! Traces thin structures, such as hair, beyond the edges of the depth map.
-//! twin: shaders/matte_trace.wgsl, matte_claim.wgsl, matte_wide.wgsl
+//! twin: shaders/matte/trace.wgsl, matte/claim.wgsl, matte/wide.wgsl
 
 use std::ops::Range;
 

@@ -9,7 +9,7 @@
 //! Weighting depth by colour is the idea of the joint bilateral filter (Kopf et al., *Joint bilateral upsampling*,
 //! 2007); its mean would invent depths at edges, the mode does not (Min, Lu, Do, *Depth video enhancement based on
 //! weighted mode filtering*, 2012).
-//! twin: shaders/refine_band.wgsl, shaders/refine_vote.wgsl
+//! twin: shaders/refine/band.wgsl, shaders/refine/vote.wgsl
 
 use std::iter;
 use std::ops::Range;

@@ -1,5 +1,5 @@
 //! The band of pixels beside depth edges: dilates a mask of edge pixels, first along rows, then down columns.
-//! twin: shaders/refine_band.wgsl
+//! twin: shaders/refine/band.wgsl
 
 use std::ops::Range;
 

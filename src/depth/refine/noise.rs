@@ -22,7 +22,7 @@ impl NoiseEstimator {
     /// slanted planes do not raise it, and edges only if they are everywhere. `inverse` returns the inverse depth of a
     /// pixel; pixels that are `is_unknown` are skipped.
     ///
-    /// twin: shaders/refine_noise.wgsl
+    /// twin: shaders/refine/noise.wgsl
     pub fn estimate(
         &mut self,
         inverse: impl Fn(usize) -> f32,

@@ -5,7 +5,7 @@
 //! ends belong to the surface. So slanted planes are preserved up to their very rim, and the two sides of an edge never
 //! mix.
 //!
-//! twin: shaders/refine_smooth.wgsl
+//! twin: shaders/refine/smooth.wgsl
 
 use std::ops::Range;
 

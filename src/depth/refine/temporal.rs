@@ -5,7 +5,7 @@
 //! while the colours around are static is mostly sensor noise: the outline of a still person flickers by some pixels.
 //! Such a step is accepted only once it lasts.
 //!
-//! twin: shaders/refine_change.wgsl, shaders/refine_steady.wgsl
+//! twin: shaders/refine/change.wgsl, shaders/refine/steady.wgsl
 
 use std::ops::Range;
 

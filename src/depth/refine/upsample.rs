@@ -4,7 +4,7 @@
 //! beside a hole the nearest neighbour is taken, so that no depth is invented; the colour-guided alignment places the edge
 //! exactly later.
 //!
-//! twin: shaders/refine_prepare.wgsl
+//! twin: shaders/refine/prepare.wgsl
 
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;

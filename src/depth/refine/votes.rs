@@ -4,7 +4,7 @@
 //! MIN_SIMILARITY)`; the mode is found by bisection (Min, Lu, Do, *Depth video enhancement based on weighted mode
 //! filtering*, 2012).
 //!
-//! twin: shaders/refine_window.wgsl, shaders/refine_vote.wgsl
+//! twin: shaders/refine/window.wgsl, shaders/refine/vote.wgsl
 
 use super::planes::{LANES, Planes};
 

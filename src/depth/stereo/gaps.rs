@@ -1,7 +1,7 @@
 //! Occlusion filling from the background: a pixel that only one camera sees lies behind the object that hides it from
 //! the other, so gaps take the farther one of the disparities left and right of them.
 //!
-//! twin: shaders/stereo_gaps.wgsl
+//! twin: shaders/stereo/gaps.wgsl
 
 use super::fixed::{UNKNOWN, is_known};
 

@@ -13,7 +13,7 @@ use crate::terminal;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::look::ApertureSetting;
 use bokehcam::look::number::{in_range_parser, whole_number_parser};
-use bokehcam::recording::still::write_color;
+use bokehcam_media::recording::still::write_color;
 
 use bokehcam_lab::aperture::{Analysis, RankErrors, draw_sheet, plot_error_by_rank};
 

@@ -24,7 +24,7 @@ use bokehcam::link::pool::Pool;
 use bokehcam::look::number::{in_range_parser, parse_count, whole_number_parser};
 use bokehcam::look::{COC_AT_INFINITY_PER_HEIGHT, Change, Look, LookFacts, MAX_RADIUS_PX, Metres, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::source::{DepthChoice, DepthOrigin, Size};
+use bokehcam_live::source::{DepthChoice, DepthOrigin, Size};
 
 /// Frames measured by default, if the time limit allows.
 const FRAMES: u32 = 20;

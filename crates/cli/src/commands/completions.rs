@@ -8,8 +8,8 @@ use clap::{Arg, Command, ValueHint};
 
 use crate::log;
 use crate::settings::file::SettingsFile;
-use bokehcam::sink::Target;
-use bokehcam::source::SourceName;
+use bokehcam_live::sink::Target;
+use bokehcam_live::source::SourceName;
 
 /// Suggestions for options whose values are more than a list of names.
 const VALUES: [(&str, &[&str]); 4] = [

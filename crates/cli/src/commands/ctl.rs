@@ -10,9 +10,9 @@ use crate::log;
 use crate::options::Global;
 use crate::settings::paths::resolve_paths;
 use crate::terminal::{print_to_stderr, print_to_stdout};
-use bokehcam::control::client::{list_run_names, send_request};
-use bokehcam::control::{Answer, ControlError, Name, Request, Status};
 use bokehcam::look::settings;
+use bokehcam_live::control::client::{list_run_names, send_request};
+use bokehcam_live::control::{Answer, ControlError, Name, Request, Status};
 
 /// Control a stream or a preview while it runs: off and on, another look, a picture
 #[derive(Args, Debug)]

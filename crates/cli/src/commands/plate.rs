@@ -15,13 +15,13 @@ use crate::options;
 use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
 use crate::terminal::{self, Guidance};
-use bokehcam::capture::{Camera, Captured, FrameBuffers};
 use bokehcam::depth::plate::{Capture, CaptureResult, Step};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::look::{Effect, Look};
-use bokehcam::recording::still;
-use bokehcam::source::{DepthChoice, Kind, Options, Source, SourceName, single_camera};
+use bokehcam_live::capture::{Camera, Captured, FrameBuffers};
+use bokehcam_live::source::{DepthChoice, Kind, Options, Source, SourceName, single_camera};
+use bokehcam_media::recording::still;
 
 /// Take a plate: a picture of the background without you, for --depth plate:FILE
 #[derive(Args, Debug)]

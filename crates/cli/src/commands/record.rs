@@ -11,13 +11,13 @@ use crate::options;
 use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
 use crate::terminal;
-use bokehcam::capture::{Captured, FrameBuffers, FrameData};
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::look::{Effect, Look};
-use bokehcam::recording::RecordingWriter;
-use bokehcam::recording::tum::RecordingSummary;
-use bokehcam::source::{Options, Source, SourceName};
+use bokehcam_live::capture::{Captured, FrameBuffers, FrameData};
+use bokehcam_live::source::{Options, Source, SourceName};
+use bokehcam_media::recording::RecordingWriter;
+use bokehcam_media::recording::tum::RecordingSummary;
 
 /// Record a source in the TUM RGB-D layout, or as an MCAP file of ROS 2
 ///

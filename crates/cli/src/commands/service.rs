@@ -15,8 +15,8 @@ use crate::files::{create_parent_folder, write_atomically};
 use crate::log;
 use crate::settings::file;
 use crate::terminal::{print_to_stderr, print_to_stdout};
-use bokehcam::files::data::user_dir;
-use bokehcam::files::input;
+use bokehcam_media::files::data::user_dir;
+use bokehcam_media::files::input;
 
 /// Start the camera for calls with your session, or stop doing so
 #[derive(Args, Debug)]

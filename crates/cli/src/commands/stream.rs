@@ -26,19 +26,19 @@ use crate::settings::look::RequestedLook;
 use crate::settings::unused;
 use crate::sinks;
 use crate::terminal;
-use bokehcam::capture::SourceInfo;
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::computing::ExecutorFactory;
-use bokehcam::control::{Claim, Name, Status};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Look, LookFacts};
-use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, PipelineError, Run};
-use bokehcam::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
-use bokehcam::source::{self, DepthOrigin, Source, SourceName};
-use bokehcam::stats::Report;
+use bokehcam_live::capture::SourceInfo;
+use bokehcam_live::control::{Claim, Name, Status};
+use bokehcam_live::pipeline::{self, BlurSetup, Destination, Pace, PipelineError, Run};
+use bokehcam_live::sink::{self, Backpressure, Shutter, ShutterControl, Sink, Target};
+use bokehcam_live::source::{self, DepthOrigin, Source, SourceName};
+use bokehcam_live::stats::Report;
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
 #[derive(Args, Debug)]

@@ -5,7 +5,7 @@ use clap::Args;
 #[cfg(feature = "window")]
 use super::Window;
 use super::{Blur, Computing, Depth, Frames, Networks, Output, Stereo, Stream};
-use bokehcam::source::Options;
+use bokehcam_live::source::Options;
 
 /// What is needed to blur a stream, wherever it goes.
 #[derive(Args, Clone, Debug)]

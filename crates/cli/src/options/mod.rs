@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
-pub use bokehcam::source::options::{Depth, Frames, Networks, Orientation, Stereo};
+pub use bokehcam_live::source::options::{Depth, Frames, Networks, Orientation, Stereo};
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named_value_parser};
 
@@ -20,8 +20,8 @@ use bokehcam::computing;
 use bokehcam::look::Effect;
 use bokehcam::look::number::{parse_positive, parse_switch, whole_number_parser};
 use bokehcam::names;
-use bokehcam::pipeline::Pace;
-use bokehcam::source::{DepthChoice, Size, SourceName};
+use bokehcam_live::pipeline::Pace;
+use bokehcam_live::source::{DepthChoice, Size, SourceName};
 #[cfg(feature = "window")]
 pub use window::Window;
 

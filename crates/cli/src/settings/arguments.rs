@@ -12,7 +12,7 @@ use super::{environment, unknown};
 use crate::error::CliError;
 use crate::log;
 use crate::options::LogFormat;
-use bokehcam::source::SourceError;
+use bokehcam_live::source::SourceError;
 
 /// Joins a negative number to the option before it: `--focus -1` becomes `--focus=-1` instead of an option `-1`, so
 /// that the option can report its accepted values.

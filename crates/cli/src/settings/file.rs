@@ -9,11 +9,11 @@ use super::paths::resolve_paths;
 use super::table::{Values, is_setting, parse_flags, suggest_setting};
 use crate::error::CliError;
 use crate::log::{escape_controls, one_line};
-use bokehcam::files::data::user_dir;
-use bokehcam::files::input;
 use bokehcam::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use bokehcam::look::{Patch, presets::Preset};
+use bokehcam_media::files::data::user_dir;
+use bokehcam_media::files::input;
 
 /// A settings file with validated values.
 #[derive(Debug, Default)]

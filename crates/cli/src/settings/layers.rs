@@ -16,7 +16,7 @@ use super::table::{Values, WINDOW_STATE, all_settings_command, find_excluded, ma
 use crate::error::CliError;
 use crate::log::one_line;
 use bokehcam::look::{SETTINGS, settings};
-use bokehcam::recording::snapshot;
+use bokehcam_media::recording::snapshot;
 
 /// A setting and its effective value.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use clap::Arg;
 
 use super::table::all_settings_command;
 use bokehcam::look::{Patch, settings};
-use bokehcam::source::DepthChoice;
+use bokehcam_live::source::DepthChoice;
 
 /// Makes the relative paths in a setting's value absolute, relative to `folder`; other values stay.
 pub fn resolve_paths(folder: &Path, name: &str, value: &str) -> String {

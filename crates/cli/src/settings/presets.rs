@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_preset_that_cannot_be_is_left_out() {
-        bokehcam::source::register_look_files();
+        bokehcam_live::source::register_look_files();
         let all = parse("[presets.gone]\naperture = \"image:/nowhere.png\"\n[presets.here]\nrim = 0\n").all_presets();
         assert_eq!(
             all.iter().filter(|preset| preset.is_user_defined).map(|preset| preset.name.as_str()).collect::<Vec<_>>(),

@@ -6,7 +6,7 @@ use super::layers::Setting;
 use super::table::{WINDOW_START, WINDOW_STATE, active_variable};
 use crate::log;
 use bokehcam::look::{Effect, Look, Strength, Value};
-use bokehcam::source::{DepthOrigin, Kind};
+use bokehcam_live::source::{DepthOrigin, Kind};
 
 /// Facts of a run that decide which settings have an effect.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bokehcam::v4l2::holders::list_holders;
+use bokehcam_live::v4l2::holders::list_holders;
 
 use super::machine::{BARS, CAMERA, Machine, Stream, VERSIONS, VIRTUAL, distance_from, frame, open, until, wish};
 

@@ -3,10 +3,10 @@
 use std::fs;
 use std::process::Command;
 
-use bokehcam::v4l2::Device;
-use bokehcam::v4l2::controls::{self, Value};
-use bokehcam::v4l2::holders::list_holders;
-use bokehcam::v4l2::node::{NodeError, resolve_node};
+use bokehcam_live::v4l2::Device;
+use bokehcam_live::v4l2::controls::{self, Value};
+use bokehcam_live::v4l2::holders::list_holders;
+use bokehcam_live::v4l2::node::{NodeError, resolve_node};
 
 use super::machine::{CAMERA, Machine, VERSIONS, VIRTUAL, beside, run, sh, until};
 

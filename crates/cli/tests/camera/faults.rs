@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use bokehcam::capture::v4l2::V4l2Camera;
+use bokehcam_live::capture::v4l2::V4l2Camera;
 
 use super::machine::{
     BARS, CAMERA, Lost, Machine, Stream, VIRTUAL, distance_from, frame, open, sh, stamped, until, wish,

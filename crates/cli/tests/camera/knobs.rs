@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 
-use bokehcam::camera_control::CameraControl;
-use bokehcam::v4l2::live::user_controls;
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::v4l2::live::user_controls;
 
 use super::machine::{CAMERA, Ends, Machine, frame, open, sh, until, wish};
 

@@ -8,13 +8,13 @@ use std::sync::mpsc::{self, Receiver};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use bokehcam::capture::v4l2::V4l2Camera;
-use bokehcam::capture::{Captured, MAX_WAIT};
 use bokehcam::frame::ColorImage;
-use bokehcam::layout::Content;
-use bokehcam::v4l2::live::ModeRequest;
-use bokehcam::v4l2::node::list_nodes;
-use bokehcam::v4l2::{Device, FourCc, controls};
+use bokehcam_live::capture::v4l2::V4l2Camera;
+use bokehcam_live::capture::{Captured, MAX_WAIT};
+use bokehcam_live::v4l2::live::ModeRequest;
+use bokehcam_live::v4l2::node::list_nodes;
+use bokehcam_live::v4l2::{Device, FourCc, controls};
+use bokehcam_media::layout::Content;
 use rustix::process::Signal;
 
 use super::program::{self, Beside, Ran, assert_accounted, json};

@@ -1,7 +1,7 @@
 //! Sizes and frame rates of a camera offered in the window, and the direction it faces.
 
-use bokehcam::capture::Camera;
-use bokehcam::source::modes::{faces_user, list_modes};
+use bokehcam_live::capture::Camera;
+use bokehcam_live::source::modes::{faces_user, list_modes};
 
 use super::machine::{CAMERA, Machine, open, wish};
 

@@ -10,10 +10,10 @@ use std::thread;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still;
-use bokehcam::sink::{Ending, Options, Target};
-use bokehcam::v4l2::live::auto_lock::AutoLock;
-use bokehcam::v4l2::node::list_nodes;
+use bokehcam_live::sink::{Ending, Options, Target};
+use bokehcam_live::v4l2::live::auto_lock::AutoLock;
+use bokehcam_live::v4l2::node::list_nodes;
+use bokehcam_media::recording::still;
 
 use rustix::process::Signal;
 

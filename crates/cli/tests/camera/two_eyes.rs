@@ -1,6 +1,6 @@
 //! Two cameras as a stereo pair.
 
-use bokehcam::v4l2::{Device, controls};
+use bokehcam_live::v4l2::{Device, controls};
 
 use super::machine::{HANG, Machine, Stream, VERSIONS, run, sh};
 

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use bokehcam::frame::{ColorImage, YuyvImage};
-use bokehcam::sink::{Ending, Options, Target};
-use bokehcam::v4l2::FourCc;
-use bokehcam::v4l2::node::list_nodes;
+use bokehcam_live::sink::{Ending, Options, Target};
+use bokehcam_live::v4l2::FourCc;
+use bokehcam_live::v4l2::node::list_nodes;
 
 use super::machine::{
     BARS, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, beside, distance_from, frame, frame_now, open, run, sh,
@@ -260,5 +260,5 @@ fn jpegs_of_a_camera_are_decoded() {
 
 /// Whether a name that matches both devices resolves to the camera.
 fn resolve_is_real() -> bool {
-    bokehcam::v4l2::node::resolve_node("i").unwrap().to_str() == Some(CAMERA)
+    bokehcam_live::v4l2::node::resolve_node("i").unwrap().to_str() == Some(CAMERA)
 }

@@ -13,10 +13,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::embedded::find;
-use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color};
-use bokehcam::recording::{Options, Recording, RecordingError};
-use bokehcam::{calibration, recording::geometry::Geometry};
+use bokehcam_media::recording::embedded::find;
+use bokehcam_media::recording::geometry::Geometry;
+use bokehcam_media::recording::still::{read_color, read_depth, read_grey, write_color};
+use bokehcam_media::recording::{Options, Recording, RecordingError};
 use tempfile::TempDir;
 
 use program::{Home, Ran};
@@ -239,7 +239,7 @@ fn only_files_are_read() {
             symlink(target, at(name)).unwrap();
         }
         assert_says(open(&folder), what);
-        assert_says(calibration::load_calibration(&[&at("left.yaml")]), what);
+        assert_says(bokehcam_media::calibration::load_calibration(&[&at("left.yaml")]), what);
         assert_says(Geometry::read(&at("calib.txt"), &at("photo.png")), what);
         assert_says(read_color(&at("photo.png")), "not a regular file");
         assert_says(read_depth(&at("map.pfm"), 1.0, None), "not a regular file");

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use bokehcam::frame::YuyvImage;
-use bokehcam::sink::{Options, PipeWire, Sink};
+use bokehcam_live::sink::{Options, PipeWire, Sink};
 use rustix::fs::inotify;
 use serde_json::Value;
 

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use bokehcam::clock::Clock;
 use bokehcam::frame::ColorImage;
-use bokehcam::pipewire::mode::{Mode, NegotiatedFormat, Offer};
-use bokehcam::pipewire::reader::{Frame, PictureHandler, Reader};
-use bokehcam::sink::{Options, PipeWire, Sink};
+use bokehcam_live::pipewire::mode::{Mode, NegotiatedFormat, Offer};
+use bokehcam_live::pipewire::reader::{Frame, PictureHandler, Reader};
+use bokehcam_live::sink::{Options, PipeWire, Sink};
 
 use super::program::Beside;
 use super::session::{folder, until};

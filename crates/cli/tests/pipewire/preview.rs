@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use bokehcam::look::Look;
-use bokehcam::source::{Frames, Options};
+use bokehcam_live::source::{Frames, Options};
 use bokehcam_window::state::{Output, Request, Source, Update};
 use bokehcam_window::system::System;
 

@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use bokehcam::source::devices::{CameraWatch, list_pipewire_cameras};
+use bokehcam_live::source::devices::{CameraWatch, list_pipewire_cameras};
 use serde_json::Value;
 
 use super::program::{Beside, Ran, bokehcam};

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use bokehcam::recording::still::{read_color, write_color, write_depth};
+use bokehcam_media::recording::still::{read_color, write_color, write_depth};
 use rustix::process::Signal;
 
 use crate::common::{color, depth, noise};

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still::{read_color, write_color};
-use bokehcam::recording::{Options, Recording};
+use bokehcam_media::recording::still::{read_color, write_color};
+use bokehcam_media::recording::{Options, Recording};
 
 use crate::common::noise;
 use crate::program::{Home, Ran};

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use bokehcam::recording::still::{read_depth, read_disparity};
+use bokehcam_media::recording::still::{read_depth, read_disparity};
 use image::GrayImage;
 
 use crate::common::grain;

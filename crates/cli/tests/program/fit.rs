@@ -7,7 +7,7 @@ use bokehcam::depth::agreement::EdgeAlignment;
 use bokehcam::engine::still::{Depth, compute_coc_and_depth};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Refine};
-use bokehcam::recording::still::{read_color, read_depth, write_color, write_depth};
+use bokehcam_media::recording::still::{read_color, read_depth, write_color, write_depth};
 
 use crate::program::Home;
 

@@ -24,7 +24,7 @@ use bokehcam::depth::stereo::{self, Effort, Pair};
 use bokehcam::frame::{ColorImage, DisparityMap, GrayImage, MixedPixel, YuyvImage};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
-use bokehcam::sink::yuyv;
+use bokehcam_live::sink::yuyv;
 use common::{coc, noise, settings, three_depths};
 use tempfile::TempDir;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still::{read_color, write_color};
+use bokehcam_media::recording::still::{read_color, write_color};
 use rustix::process::Signal;
 
 use crate::program::{Beside, Home, Ran, until};

@@ -9,10 +9,10 @@ use bokehcam::engine::still;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Look, LookFacts, Metres, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::recording::DepthUnit;
-use bokehcam::recording::still::{read_color, write_color};
-use bokehcam::source::options::Depth;
-use bokehcam::source::photo::read_depth_file;
+use bokehcam_live::source::options::Depth;
+use bokehcam_live::source::photo::read_depth_file;
+use bokehcam_media::recording::DepthUnit;
+use bokehcam_media::recording::still::{read_color, write_color};
 
 use crate::common::color;
 use crate::program::{Home, Ran};

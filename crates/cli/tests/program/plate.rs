@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still;
+use bokehcam_media::recording::still;
 
 use crate::program::Home;
 use crate::room::{PERSON, ROOM};

@@ -15,8 +15,8 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{CocRule, Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::recording::still::{read_color, write_color, write_depth};
+use bokehcam_media::recording::snapshot::{self, Snapshot};
+use bokehcam_media::recording::still::{read_color, write_color, write_depth};
 use common::{noise, three_depths};
 
 use crate::program::{Home, Ran};

@@ -9,9 +9,9 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::recording::still::write_color;
-use bokehcam::recording::tum::{Writer, WriterOptions};
-use bokehcam::recording::{Options, Recording, Scratch};
+use bokehcam_media::recording::still::write_color;
+use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::{Options, Recording, Scratch};
 use rustix::process::Signal;
 
 use crate::common::noise;

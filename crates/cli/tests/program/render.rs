@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::PhotoMetadata;
-use bokehcam::recording::still::{read_photo, write_photo};
+use bokehcam_media::recording::PhotoMetadata;
+use bokehcam_media::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
 
 use crate::common::color;

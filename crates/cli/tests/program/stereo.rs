@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::tum::{Writer, WriterOptions};
-use bokehcam::recording::{Options, Recording, Scratch};
+use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::{Options, Recording, Scratch};
 
 fn path(folder: &Path) -> &str {
     folder.to_str().unwrap()

@@ -4,8 +4,8 @@ use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use bokehcam::recording::snapshot;
-use bokehcam::recording::still::read_color;
+use bokehcam_media::recording::snapshot;
+use bokehcam_media::recording::still::read_color;
 use serde_json::Value;
 
 use super::picture::{distance, is_photograph};

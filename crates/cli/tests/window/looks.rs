@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still::read_color;
+use bokehcam_media::recording::still::read_color;
 
 use super::picture::{distance, is_photograph, middle, part};
 use super::preview::Program;

@@ -80,7 +80,7 @@ fn a_photo_or_folder_dropped_on_the_window_is_opened_and_nonsense_changes_nothin
     std::fs::write(path("letter.txt"), "Dear all").unwrap();
     let mut photo = ColorImage::new(320, 180);
     photo.rgb.as_chunks_mut::<3>().0.fill([200, 40, 20]);
-    bokehcam::recording::still::write_color(files.path().join("red one.png").as_ref(), &photo, false).unwrap();
+    bokehcam_media::recording::still::write_color(files.path().join("red one.png").as_ref(), &photo, false).unwrap();
     drop_on(&window, &[path("letter.txt")]);
     until("it is told", PATIENCE, || program.said().contains("neither a folder, a photo nor a video"));
     assert!(window.title().contains("synthetic"), "{}", window.title());
@@ -112,7 +112,7 @@ fn a_recording_is_stepped_through_and_its_pixels_are_shown_as_they_are() {
     window.key(&[], HOME);
     let frame = |name: &str| {
         let file = format!("{PORTRAIT}/rgb/{name}.png");
-        bokehcam::recording::still::read_color(file.as_ref()).unwrap()
+        bokehcam_media::recording::still::read_color(file.as_ref()).unwrap()
     };
     // In a smaller window, 100 % zoom shows the recording's pixels unscaled in the middle.
     window.resize(600, 400);

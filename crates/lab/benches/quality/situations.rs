@@ -11,12 +11,12 @@ use bokehcam::bokeh::aperture::{Aperture, lens_points};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::core_count;
 use bokehcam::depth::plate::{Capture, CaptureResult, Companion, PlateDepth};
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
-use bokehcam::network::Task;
-use bokehcam::source::installed::{find_best, find_best_in};
 use bokehcam_lab::scene::{Scene, Situation, ThinLens, View};
+use bokehcam_live::source::installed::{find_best, find_best_in};
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::Task;
 use serde::Serialize;
 
 use super::masks::add_camera_noise;

@@ -25,12 +25,12 @@ use bokehcam::bokeh::{Backend, Bokeh, BokehError};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::ComputeOptions;
-use bokehcam::depth::recorded::RecordedDepth;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
-use bokehcam::pipeline::{self, BlurSetup, Destination, Pace, Run};
-use bokehcam::recording::{Options as Reading, Recording};
-use bokehcam::stats::Report;
+use bokehcam_live::pipeline::{self, BlurSetup, Destination, Pace, Run};
+use bokehcam_live::stats::Report;
+use bokehcam_media::depth::recorded::RecordedDepth;
+use bokehcam_media::recording::{Options as Reading, Recording};
 use clap::Parser;
 
 use footprint::Footprint;

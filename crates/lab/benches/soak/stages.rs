@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bokehcam::bokeh::{BlurredFrame, Bokeh, BokehError, Job};
-use bokehcam::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::frame::{ColorImage, Stamp};
-use bokehcam::recording::{Recording, Scratch};
-use bokehcam::sink::{Ending, Sink, SinkError};
-use bokehcam::stats::DropCause;
+use bokehcam_live::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
+use bokehcam_live::sink::{Ending, Sink, SinkError};
+use bokehcam_live::stats::DropCause;
+use bokehcam_media::recording::{Recording, Scratch};
 
 /// Frame period.
 pub const PERIOD_NS: u64 = 33_333_333;

@@ -1,6 +1,6 @@
 //! The criteria, and the results against them.
 
-use bokehcam::stats::Report;
+use bokehcam_live::stats::Report;
 
 use crate::loader;
 use crate::stages::PERIOD_NS;

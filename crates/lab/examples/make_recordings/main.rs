@@ -13,10 +13,10 @@ use std::process::ExitCode;
 use std::thread;
 
 use bokehcam::bokeh::aperture::{Aperture, Shape, lens_points};
-use bokehcam::capture::demo::{self, Demo};
-use bokehcam::capture::{Camera, FrameBuffers};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam_lab::scene::{Scene, ThinLens, View};
+use bokehcam_live::capture::demo::{self, Demo};
+use bokehcam_live::capture::{Camera, FrameBuffers};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};

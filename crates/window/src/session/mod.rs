@@ -19,17 +19,17 @@ use worker::SessionWorker;
 
 use super::services::{CliOption, Services};
 use super::state::{Output, Request, Update};
-use bokehcam::capture::Seeker;
-use bokehcam::control::Answer;
 use bokehcam::depth::plate::Guide;
-use bokehcam::files::user_folders::{self as folders, Folders};
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
-use bokehcam::pipeline::{OutputRequest, PipelineError, View};
-use bokehcam::sink::ShutterControl;
-use bokehcam::sink::tee_control::MemberEvent;
-use bokehcam::stats::Report;
+use bokehcam_live::capture::Seeker;
+use bokehcam_live::control::Answer;
+use bokehcam_live::pipeline::{OutputRequest, PipelineError, View};
+use bokehcam_live::sink::ShutterControl;
+use bokehcam_live::sink::tee_control::MemberEvent;
+use bokehcam_live::stats::Report;
+use bokehcam_media::files::user_folders::{self as folders, Folders};
 
 /// A slower close is logged.
 const SLOW_CLOSE: Duration = Duration::from_secs(3);

@@ -12,12 +12,12 @@ use super::super::services::Services;
 use super::super::state::{Output, Update};
 use super::{EventSender, SessionConfig};
 use bokehcam::clock::Clock;
-use bokehcam::files::user_folders as folders;
 use bokehcam::frame::ColorImage;
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::sink::card::draw_card;
-use bokehcam::sink::tee_control::{MemberEvent, MemberState};
-use bokehcam::sink::{self, Ending, Shutter, ShutterControl, Sink, SinkError, Target, Tee, TeeControl};
+use bokehcam_live::sink::card::draw_card;
+use bokehcam_live::sink::tee_control::{MemberEvent, MemberState};
+use bokehcam_live::sink::{self, Ending, Shutter, ShutterControl, Sink, SinkError, Target, Tee, TeeControl};
+use bokehcam_media::files::user_folders as folders;
 
 /// Size and period of the pictures before the first source is open; nothing shows them.
 const FIRST_SIZE: (u32, u32) = (16, 16);

@@ -13,9 +13,9 @@ use super::{EventSender, SessionConfig, SessionEvent};
 use bokehcam::depth::plate::Guide;
 use bokehcam::link;
 use bokehcam::look::{Look, LookFacts};
-use bokehcam::pipeline::{self, BlurSetup, ChangeSender, Destination, Pace, PipelineError, Run};
-use bokehcam::source::{Kind, SourceName};
-use bokehcam::stats::Report;
+use bokehcam_live::pipeline::{self, BlurSetup, ChangeSender, Destination, Pace, PipelineError, Run};
+use bokehcam_live::source::{Kind, SourceName};
+use bokehcam_live::stats::Report;
 
 /// A running pipeline, and the handles that control it.
 pub(super) struct PipelineRun {

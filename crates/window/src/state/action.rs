@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use super::{Camera, DepthMethod, Output, Source, ViewMode};
 use crate::services::PathKind;
-use bokehcam::camera_control::CameraControl;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
-use bokehcam::source::devices::Choice;
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::source::devices::Choice;
 
 /// A user action. Every control and key produces one of these.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::{Request, Source, State};
 use bokehcam::look::Metres;
-use bokehcam::source::modes::Mode;
+use bokehcam_live::source::modes::Mode;
 
 /// Camera modes, and properties of the running source.
 #[derive(Clone, Debug, Default, PartialEq)]

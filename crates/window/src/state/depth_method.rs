@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use bokehcam::source::{DepthChoice, DepthOrigin, NetworkFile, PlateFile, SingleCameraDepth};
+use bokehcam_live::source::{DepthChoice, DepthOrigin, NetworkFile, PlateFile, SingleCameraDepth};
 
 /// A depth method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -37,7 +37,7 @@ impl DepthMethod {
             }),
             Self::Plate => DepthChoice::SingleCamera(SingleCameraDepth {
                 plate: Some(PlateFile::Taken),
-                ..bokehcam::source::installed_networks()
+                ..bokehcam_live::source::installed_networks()
             }),
         }
     }

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::{Request, Source, State};
-use bokehcam::source::{Kind, SourceName};
+use bokehcam_live::source::{Kind, SourceName};
 
 /// A file or folder that was dropped on the window.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,11 +66,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let photo = folder.path().join("wall.png");
         let name = photo.display().to_string();
-        bokehcam::recording::still::write_color(&photo, &bokehcam::frame::ColorImage::new(4, 4), false).unwrap();
+        bokehcam_media::recording::still::write_color(&photo, &bokehcam::frame::ColorImage::new(4, 4), false).unwrap();
         let dropped = |is_camera: bool, is_in_call: bool| {
             let mut state = sample::state();
             let Source::Running(running) = &mut state.source else { unreachable!("it runs") };
-            running.kind = if is_camera { Default::default() } else { bokehcam::source::Kind::Recording };
+            running.kind = if is_camera { Default::default() } else { bokehcam_live::source::Kind::Recording };
             state.outputs.extend(is_in_call.then(|| Output { name: "pipewire".into(), is_camera: true }));
             assert_eq!(state.apply(Action::Drop(name.clone())), [Request::Offer(name.clone())]);
             assert_eq!(state.asked_file(), None, "it may be no source");

@@ -36,15 +36,15 @@ pub use transport::Transport;
 pub use zoom::Zoom;
 
 pub use super::views::ViewMode;
-use bokehcam::camera_control::CameraControl;
-use bokehcam::capture::demo;
 use bokehcam::depth::plate::Step;
 use bokehcam::frame::crop::Crop;
 use bokehcam::look::Look;
 use bokehcam::look::presets::Preset;
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::capture::demo;
 
-use bokehcam::source::devices::Choice;
-use bokehcam::source::{DepthOrigin, Kind};
+use bokehcam_live::source::devices::Choice;
+use bokehcam_live::source::{DepthOrigin, Kind};
 
 /// Status of the source.
 #[derive(Clone, Debug, Default, PartialEq)]

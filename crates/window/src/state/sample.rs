@@ -1,11 +1,11 @@
 //! Sample states for tests.
 
 use super::{DepthMethod, Running, Source, State};
-use bokehcam::camera_control::CameraControl;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch, Strength, Tilt};
-use bokehcam::source::devices::Choice;
-use bokehcam::source::{DepthOrigin, Kind};
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::source::devices::Choice;
+use bokehcam_live::source::{DepthOrigin, Kind};
 
 /// Returns a typical look.
 pub fn look() -> Look {

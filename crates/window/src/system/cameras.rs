@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use bokehcam::source::SourceName;
-use bokehcam::source::devices::{self, Choice};
+use bokehcam_live::source::SourceName;
+use bokehcam_live::source::devices::{self, Choice};
 
 /// Returns all cameras, those that only PipeWire has last.
 pub fn list_cameras() -> Vec<Choice> {

@@ -21,9 +21,9 @@ pub use saved_state::{SavedState, WindowSize};
 use super::session;
 use super::state::State;
 use bokehcam::compute::device::Device;
-use bokehcam::control::Claim;
-use bokehcam::controller::CommandLine;
-use bokehcam::stats::Report;
+use bokehcam_live::control::Claim;
+use bokehcam_live::controller::CommandLine;
+use bokehcam_live::stats::Report;
 
 bokehcam::names::named! {
     /// The window's colours.

@@ -8,9 +8,9 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::state::Preferences;
-use bokehcam::files::{atomic_file, input};
 use bokehcam::look::{Look, LookError, Patch};
-use bokehcam::source::{Kind, SourceName, devices};
+use bokehcam_live::source::{Kind, SourceName, devices};
+use bokehcam_media::files::{atomic_file, input};
 
 /// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_and_nonsense_is_nothing() {
-        bokehcam::source::register_look_files();
+        bokehcam_live::source::register_look_files();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/window.toml");
         assert_eq!(SavedState::read(&path), None);

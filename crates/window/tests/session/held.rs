@@ -10,7 +10,7 @@ use bokehcam::engine::still::{self as engine_still, Depth};
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::View;
+use bokehcam_live::pipeline::View;
 use bokehcam_window::session::Still;
 use bokehcam_window::state::{Output, Request, Update};
 

@@ -6,18 +6,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bokehcam::bokeh::{self, Bokeh};
-use bokehcam::camera_control::CameraControl;
-use bokehcam::capture::synthetic::Format;
-use bokehcam::capture::{Camera as Capture, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::View;
-use bokehcam::sink::{self, Ending, Sink, SinkError};
-use bokehcam::source::{self, devices::Choice};
 use bokehcam_lab::synthetic::Synthetic;
+use bokehcam_live::camera_control::CameraControl;
+use bokehcam_live::capture::synthetic::Format;
+use bokehcam_live::capture::{Camera as Capture, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
+use bokehcam_live::pipeline::View;
+use bokehcam_live::sink::{self, Ending, Sink, SinkError};
+use bokehcam_live::source::{self, devices::Choice};
 use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod, Source, Update};
 

@@ -1,5 +1,5 @@
 //! Clusters of one cell: weighted sums over its near and its far surface.
-//! twin: shaders/matte_clusters.wgsl
+//! twin: shaders/matte/clusters.wgsl
 
 #![allow(clippy::needless_range_loop)] // Pixels and planes index several arrays at once.
 

@@ -1,5 +1,5 @@
 //! Colour models around edge pixels: pixels of one cell between the same surfaces share one model.
-//! twin: shaders/matte_surfaces.wgsl, matte_enter.wgsl
+//! twin: shaders/matte/surfaces.wgsl, matte/enter.wgsl
 
 use std::ops::Range;
 

@@ -14,35 +14,35 @@ use crate::compute::device::{Shader, shader};
 use crate::frame::DepthMap;
 
 /// Edge detection, and the number of set bits before each word and each block of words.
-pub const FIND_EDGES: Shader = shader!("matte_common"; "matte_find_edges");
-pub const COUNT: Shader = shader!("matte_common"; "matte_count", "matte_sum");
-pub const TOTAL: Shader = shader!("matte_common"; "matte_total", "matte_sum");
+pub const FIND_EDGES: Shader = shader!(matte: "common"; "find_edges");
+pub const COUNT: Shader = shader!(matte: "common"; "count", "sum");
+pub const TOTAL: Shader = shader!(matte: "common"; "total", "sum");
 /// The colours of surfaces.
-pub const CLUSTERS: Shader = shader!("matte_common"; "matte_clusters", "matte_light");
+pub const CLUSTERS: Shader = shader!(matte: "common"; "clusters", "light");
 /// The pixels at edges, their likelihoods, and alpha.
 pub const EDGES: Shader = shader!(
-    "matte_common"; "matte_edges", "matte_light", "matte_background", "matte_contrast", "matte_surfaces", "matte_compare",
-    "matte_enter"
+    matte: "common"; "edges", "light", "background", "contrast", "surfaces", "compare",
+    "enter"
 );
-pub const EXPECT: Shader = shader!("matte_common"; "matte_expect", "matte_run", "matte_prior", "matte_weights");
-pub const WEIGH: Shader = shader!("matte_common"; "matte_weigh", "matte_prior", "matte_weights", "matte_claim");
+pub const EXPECT: Shader = shader!(matte: "common"; "expect", "run", "prior", "weights");
+pub const WEIGH: Shader = shader!(matte: "common"; "weigh", "prior", "weights", "claim");
 /// Traces thin structures beyond the edges of the map, and discards wide regions.
 pub const TRACE: Shader = shader!(
-    "matte_common"; "matte_trace", "matte_run", "matte_light", "matte_background", "matte_contrast", "matte_surfaces",
-    "matte_compare", "matte_enter", "matte_prior", "matte_weights", "matte_claim"
+    matte: "common"; "trace", "run", "light", "background", "contrast", "surfaces",
+    "compare", "enter", "prior", "weights", "claim"
 );
-pub const SPREAD: Shader = shader!("matte_common"; "matte_wide", "matte_run");
+pub const SPREAD: Shader = shader!(matte: "common"; "wide", "run");
 /// The mixed pixels and their colours.
-pub const MARK: Shader = shader!("matte_common"; "matte_mark");
-pub const MIX: Shader = shader!("matte_common"; "matte_mix", "matte_light", "matte_background", "matte_contrast");
+pub const MARK: Shader = shader!(matte: "common"; "mark");
+pub const MIX: Shader = shader!(matte: "common"; "mix", "light", "background", "contrast");
 
 pub const ALL: [Shader; 11] = [FIND_EDGES, COUNT, TOTAL, CLUSTERS, EDGES, EXPECT, WEIGH, TRACE, SPREAD, MARK, MIX];
 
-/// Pixels in a word of bits, rows of a workgroup of `matte_find_edges`, and words in a block.
+/// Pixels in a word of bits, rows of a workgroup of `matte/find_edges`, and words in a block.
 pub const WORD: u32 = 32;
 pub const ROWS: u32 = 8;
 pub const BLOCK: u32 = 256;
-/// Workgroups of `matte_expect`, and threads of each; threads of all other passes over entries.
+/// Workgroups of `matte/expect`, and threads of each; threads of all other passes over entries.
 pub const LANES: u32 = 64;
 /// Length of `counts` before the blocks' counts.
 pub const COUNTS: usize = 64;
@@ -56,10 +56,10 @@ pub fn workgroup_count(count: usize) -> u32 {
     count.clamp(1, 4096) as u32
 }
 
-// `matte_common`, `matte_clusters` and `matte_compare` repeat these as array lengths and bit positions.
+// `matte/common`, `matte/clusters` and `matte/compare` repeat these as array lengths and bit positions.
 const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MAX_STEPS < 20);
 
-/// Returns the `override` constants of `matte_common.wgsl`; `again` for the second run of a pass.
+/// Returns the `override` constants of `matte/common.wgsl`; `again` for the second run of a pass.
 pub fn constants(again: bool) -> [(&'static str, f64); 31] {
     [
         ("AGAIN", u8::from(again).into()),
@@ -96,7 +96,7 @@ pub fn constants(again: bool) -> [(&'static str, f64); 31] {
     ]
 }
 
-/// Mirrors `Frame` of `matte_common.wgsl`, which documents each field.
+/// Mirrors `Frame` of `matte/common.wgsl`, which documents each field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -108,7 +108,7 @@ pub struct Frame {
     pub surface_step: f32,
 }
 
-/// Mirrors `PassRun` of `matte_run.wgsl`, which documents its field.
+/// Mirrors `PassRun` of `matte/run.wgsl`, which documents its field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]

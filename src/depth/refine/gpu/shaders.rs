@@ -17,27 +17,27 @@ use crate::depth::guided_fill::{self, COLOR_PREFERENCE, COLOR_UPDATE_RATE, SAMPL
 use crate::frame::DepthMap;
 
 /// Resampling of the map, and packing of the picture.
-pub const PREPARE: Shader = shader!("refine_common"; "refine_prepare");
+pub const PREPARE: Shader = shader!(refine: "common"; "prepare");
 /// Hole filling: known depths beside holes, and then above and below.
-pub const BESIDE: Shader = shader!("refine_common"; "refine_beside", "refine_ends");
-pub const FILL: Shader = shader!("refine_common"; "refine_fill", "refine_ends");
+pub const BESIDE: Shader = shader!(refine: "common"; "beside", "ends");
+pub const FILL: Shader = shader!(refine: "common"; "fill", "ends");
 /// Colour-guided hole filling: holes that belong to the near side.
-pub const CLAIM: Shader = shader!("refine_common"; "refine_claim");
-pub const AGREE: Shader = shader!("refine_common"; "refine_agree");
+pub const CLAIM: Shader = shader!(refine: "common"; "claim");
+pub const AGREE: Shader = shader!(refine: "common"; "agree");
 /// Noise measurement, and the sigma filter.
-pub const NOISE: Shader = shader!("refine_common"; "refine_noise", "refine_select");
-pub const SMOOTH: Shader = shader!("refine_common"; "refine_smooth");
+pub const NOISE: Shader = shader!(refine: "common"; "noise", "select");
+pub const SMOOTH: Shader = shader!(refine: "common"; "smooth");
 /// Edge detection, and edge alignment.
-pub const BAND: Shader = shader!("refine_common"; "refine_band");
-pub const VOTE: Shader = shader!("refine_common"; "refine_vote", "refine_lanes", "refine_window");
+pub const BAND: Shader = shader!(refine: "common"; "band");
+pub const VOTE: Shader = shader!(refine: "common"; "vote", "lanes", "window");
 /// Colour change since the last frame, and the temporal filter.
-pub const CHANGE: Shader = shader!("refine_common"; "refine_change");
-pub const MEDIAN: Shader = shader!("refine_common"; "refine_median", "refine_select");
-pub const STEADY: Shader = shader!("refine_common"; "refine_steady");
+pub const CHANGE: Shader = shader!(refine: "common"; "change");
+pub const MEDIAN: Shader = shader!(refine: "common"; "median", "select");
+pub const STEADY: Shader = shader!(refine: "common"; "steady");
 
 pub const ALL: [Shader; 12] = [PREPARE, BESIDE, FILL, CLAIM, AGREE, NOISE, SMOOTH, BAND, VOTE, CHANGE, MEDIAN, STEADY];
 
-/// Workgroup sizes: of tiles, of strips along rows, and columns per workgroup of `refine_fill`.
+/// Workgroup sizes: of tiles, of strips along rows, and columns per workgroup of `refine/fill`.
 pub const TILE: [u32; 2] = [16, 16];
 pub const STRIP: [u32; 2] = [64, 4];
 pub const COLUMNS: u32 = 16;
@@ -59,13 +59,13 @@ pub const SAMPLES: usize = if noise::GRID > temporal::GRID { noise::GRID.pow(2) 
 /// Flag of the pixels that were processed in the first round.
 pub const PROCESSED: u32 = 8;
 
-// Array lengths in `refine_band`, `refine_lanes` and `refine_window`.
+// Array lengths in `refine/band`, `refine/lanes` and `refine/window`.
 const _: () = assert!(BAND_PX == 4 && LANES == 16 && size_of::<Weights>() == 9 * LANES * 4);
 // The shader computes the offsets as multiples of the first.
 const _: () =
     assert!(PAIRS_PX[1] == 2 * PAIRS_PX[0] && PAIRS_PX[2] == 3 * PAIRS_PX[0] && PAIRS_PX[3] == 4 * PAIRS_PX[0]);
 
-/// Returns the `override` constants of `refine_common.wgsl`; `again` for the second run of a pass.
+/// Returns the `override` constants of `refine/common.wgsl`; `again` for the second run of a pass.
 pub fn constants(again: bool) -> [(&'static str, f64); 36] {
     [
         ("DOWN", u8::from(again).into()),
@@ -107,7 +107,7 @@ pub fn constants(again: bool) -> [(&'static str, f64); 36] {
     ]
 }
 
-/// `Frame` of `refine_common.wgsl`, which documents the fields.
+/// `Frame` of `refine/common.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -123,7 +123,7 @@ pub struct Frame {
     pub unused: u32,
 }
 
-/// `Wave` of `refine_vote.wgsl`, which documents the fields.
+/// `Wave` of `refine/vote.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]

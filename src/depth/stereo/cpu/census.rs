@@ -4,7 +4,7 @@
 //! The neighbours are every other pixel of a 9x9 window: 24 bits are as informative as all 80, and a wide window is
 //! more distinctive than a dense one. The Hamming distance of two codes is independent of the exposure of the cameras.
 //!
-//! twin: shaders/stereo_census.wgsl
+//! twin: shaders/stereo/census.wgsl
 
 use std::sync::atomic::AtomicBool;
 

@@ -1,6 +1,6 @@
 //! The matching cost: Hamming distance of the census codes of a left and a right pixel, aggregated over 3x3 pixels.
 //!
-//! twin: shaders/stereo_cost.wgsl
+//! twin: shaders/stereo/cost.wgsl
 
 use super::super::fixed::{OUTSIDE_COST, PRIOR_BONUS};
 use super::GROUP;

@@ -8,7 +8,7 @@
 //! fit a byte: a cost is at most 27 and P2 at most 60, so that the values of a path are at most 87, and the sum of
 //! three halves at most 129.
 //!
-//! twin: shaders/stereo_path.wgsl
+//! twin: shaders/stereo/path.wgsl
 
 use super::super::Settings;
 use super::super::fixed::P1;

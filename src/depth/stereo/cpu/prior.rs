@@ -4,7 +4,7 @@
 //! bonus for the last disparity decides instead. In textured areas the correct disparity is better by more than the
 //! bonus, so that moving objects do not keep an old one.
 //!
-//! twin: shaders/stereo_likely.wgsl
+//! twin: shaders/stereo/likely.wgsl
 
 use pulp::{Arch, WithSimd};
 

@@ -1,6 +1,6 @@
 //! The speckle filter: removes small components whose disparity differs from their surroundings, which are mismatches.
 //!
-//! twin: shaders/stereo_runs.wgsl, shaders/stereo_join.wgsl, shaders/stereo_sizes.wgsl, shaders/stereo_gaps.wgsl
+//! twin: shaders/stereo/runs.wgsl, shaders/stereo/join.wgsl, shaders/stereo/sizes.wgsl, shaders/stereo/gaps.wgsl
 
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! Winner takes all with the left-right consistency check: for each left pixel, the disparity with the least sum,
 //! unless the winner of its right partner differs by more than [`MAX_LR_DIFFERENCE`].
 //!
-//! twin: shaders/stereo_winners.wgsl
+//! twin: shaders/stereo/winners.wgsl
 
 use std::ops::Range;
 

@@ -7,34 +7,34 @@ use crate::calibration::map::{DOWN_SHIFT, NOWHERE, ONE as WHOLE};
 use crate::compute::device::{Shader, shader, workgroups_2d};
 
 /// Temporal prior from the last pair.
-pub const LIKELY: Shader = shader!("stereo_common"; "stereo_likely", "stereo_line");
+pub const LIKELY: Shader = shader!(stereo: "common"; "likely", "line");
 /// Census transform of both pictures, and P2 between left pixels.
-pub const CENSUS: Shader = shader!("stereo_common"; "stereo_census");
+pub const CENSUS: Shader = shader!(stereo: "common"; "census");
 /// Matching costs.
-pub const COST: Shader = shader!("stereo_common"; "stereo_cost");
+pub const COST: Shader = shader!(stereo: "common"; "cost");
 /// Cost aggregation along each row, in either direction.
-pub const ROWS: Shader = shader!("stereo_common"; "stereo_rows", "stereo_path");
+pub const ROWS: Shader = shader!(stereo: "common"; "rows", "path");
 /// Cost aggregation down each column.
-pub const COLUMNS: Shader = shader!("stereo_common"; "stereo_columns", "stereo_path");
+pub const COLUMNS: Shader = shader!(stereo: "common"; "columns", "path");
 /// Winner takes all with the left-right consistency check.
-pub const WINNERS: Shader = shader!("stereo_common"; "stereo_winners", "stereo_line");
+pub const WINNERS: Shader = shader!(stereo: "common"; "winners", "line");
 /// Connected components within rows.
-pub const RUNS: Shader = shader!("stereo_common"; "stereo_runs", "stereo_row", "stereo_touch");
+pub const RUNS: Shader = shader!(stereo: "common"; "runs", "row", "touch");
 /// Connected components joined from row to row.
-pub const JOIN: Shader = shader!("stereo_common"; "stereo_join", "stereo_line", "stereo_touch", "stereo_root");
+pub const JOIN: Shader = shader!(stereo: "common"; "join", "line", "touch", "root");
 /// Sizes of the components.
-pub const SIZES: Shader = shader!("stereo_common"; "stereo_sizes", "stereo_line", "stereo_touch", "stereo_root");
+pub const SIZES: Shader = shader!(stereo: "common"; "sizes", "line", "touch", "root");
 /// Removal of small components, and filling of gaps.
-pub const GAPS: Shader = shader!("stereo_common"; "stereo_gaps", "stereo_row");
+pub const GAPS: Shader = shader!(stereo: "common"; "gaps", "row");
 /// The map packed for the CPU.
-pub const PACK: Shader = shader!("stereo_common"; "stereo_pack", "stereo_line");
+pub const PACK: Shader = shader!(stereo: "common"; "pack", "line");
 
 pub const ALL: [Shader; 11] = [LIKELY, CENSUS, COST, ROWS, COLUMNS, WINNERS, RUNS, JOIN, SIZES, GAPS, PACK];
 
 /// Rectification of a picture before matching; it has constants of its own.
-pub const RECTIFY: Shader = shader!("stereo_line"; "stereo_rectify");
+pub const RECTIFY: Shader = shader!(stereo: "line"; "rectify");
 
-/// Returns the `override` constants of `stereo_rectify.wgsl`, for pictures of `bytes` bytes.
+/// Returns the `override` constants of `stereo/rectify.wgsl`, for pictures of `bytes` bytes.
 pub fn rectify_constants(bytes: usize, stride: usize, channels: usize) -> [(&'static str, f64); 6] {
     [
         ("BYTES", bytes as f64),
@@ -46,7 +46,7 @@ pub fn rectify_constants(bytes: usize, stride: usize, channels: usize) -> [(&'st
     ]
 }
 
-/// Pixels or words per workgroup, as `stereo_line.wgsl` declares it.
+/// Pixels or words per workgroup, as `stereo/line.wgsl` declares it.
 const LINE: usize = 64;
 
 /// Returns the workgroups of a pass over `count` pixels or words in linear order.
@@ -54,7 +54,7 @@ pub fn linear_workgroups(count: usize) -> [u32; 3] {
     workgroups_2d(count.div_ceil(LINE) as u32)
 }
 
-/// The `override` constants of `stereo_common.wgsl`.
+/// The `override` constants of `stereo/common.wgsl`.
 pub type Constants = [(&'static str, f64); 14];
 
 /// Returns the constants for pictures of this size, with speckles of up to `max_speckle` pixels removed; `from_right`

@@ -48,7 +48,7 @@ pub fn render_first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage,
 /// Fails if the demonstration cannot be decoded.
 #[cfg(not(feature = "lab"))]
 pub fn render_first_frame(_: Scene, (width, height): (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
-    use bokehcam::capture::{Camera, FrameBuffers, demo::Demo};
+    use bokehcam_live::capture::{Camera, FrameBuffers, demo::Demo};
     let (mut demo_color, mut demo_depth) = (ColorImage::default(), DepthMap::default());
     Demo::new(Some(1))?.next(FrameBuffers {
         color: &mut demo_color,

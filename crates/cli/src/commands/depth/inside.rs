@@ -7,9 +7,9 @@ use crate::log;
 use crate::options::Global;
 use crate::terminal;
 use bokehcam::frame::DepthMap;
-use bokehcam::recording::depth_file::{DepthFile, DepthInside, Distances, read_inside};
-use bokehcam::recording::still;
-use bokehcam::source::options::DEPTH_SCALE;
+use bokehcam_live::source::options::DEPTH_SCALE;
+use bokehcam_media::recording::depth_file::{DepthFile, DepthInside, Distances, read_inside};
+use bokehcam_media::recording::still;
 
 /// Extracts the depth inside the photo.
 ///

@@ -22,11 +22,11 @@ use bokehcam::depth::stereo::{Effort, MatchError, Pair, Settings};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use bokehcam::look::number::{in_range_parser, parse_positive, whole_number_parser};
 use bokehcam::optics::StereoRig;
-use bokehcam::recording::geometry::Geometry;
-use bokehcam::recording::still::{self, MapFormat};
-use bokehcam::source::calib::{self, PairCalibration};
-use bokehcam::source::options::DEPTH_SCALE;
-use bokehcam::source::photo;
+use bokehcam_live::source::calib::{self, PairCalibration};
+use bokehcam_live::source::options::DEPTH_SCALE;
+use bokehcam_live::source::photo;
+use bokehcam_media::recording::geometry::Geometry;
+use bokehcam_media::recording::still::{self, MapFormat};
 
 use preview::colorize_disparity;
 

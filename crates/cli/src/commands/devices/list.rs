@@ -9,11 +9,11 @@ use super::{CliError, DevicesCommand};
 use crate::options::Global;
 use crate::terminal;
 use crate::terminal::print_to_stdout;
-use bokehcam::v4l2::controls::{self, Control, Kind as ControlKind};
-use bokehcam::v4l2::holders::{Holder, list_holders};
-use bokehcam::v4l2::modes::{FormatModes, list_modes};
-use bokehcam::v4l2::node::{self, Kind, Node};
-use bokehcam::v4l2::{Device, controls::Value};
+use bokehcam_live::v4l2::controls::{self, Control, Kind as ControlKind};
+use bokehcam_live::v4l2::holders::{Holder, list_holders};
+use bokehcam_live::v4l2::modes::{FormatModes, list_modes};
+use bokehcam_live::v4l2::node::{self, Kind, Node};
+use bokehcam_live::v4l2::{Device, controls::Value};
 
 /// A device as it is listed.
 #[derive(Serialize)]

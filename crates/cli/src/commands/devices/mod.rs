@@ -10,7 +10,7 @@ use clap::Args;
 use crate::error::CliError;
 use crate::options::Global;
 #[cfg(feature = "camera")]
-use bokehcam::v4l2::node::Node;
+use bokehcam_live::v4l2::node::Node;
 
 /// List cameras and virtual cameras
 ///

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use crate::error::CliError;
-use bokehcam::v4l2::modes::FormatModes;
+use bokehcam_live::v4l2::modes::FormatModes;
 
 /// A PipeWire camera.
 #[derive(Serialize)]
@@ -20,8 +20,8 @@ pub struct PipewireCamera {
 /// Lists all cameras of PipeWire; empty if PipeWire is not running.
 #[cfg(feature = "pipewire")]
 pub fn list_cameras() -> Vec<PipewireCamera> {
-    use bokehcam::capture::pipewire::format_modes;
-    use bokehcam::pipewire::graph::Graph;
+    use bokehcam_live::capture::pipewire::format_modes;
+    use bokehcam_live::pipewire::graph::Graph;
     let graph = Graph::list_with_modes().unwrap_or_else(|error| {
         tracing::info!("{error}");
         Graph::default()

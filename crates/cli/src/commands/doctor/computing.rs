@@ -24,8 +24,8 @@ pub fn check_computing() -> Vec<Finding> {
 /// Checks whether a single camera can give a portrait.
 #[cfg(feature = "networks")]
 fn check_networks() -> Finding {
-    use bokehcam::network::Task;
-    let installed = bokehcam::source::installed::installed_networks();
+    use bokehcam_media::network::Task;
+    let installed = bokehcam_live::source::installed::installed_networks();
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
     match persons {

@@ -11,7 +11,7 @@ use super::pipewire_camera::{self, PipeWireResults};
 use super::system::System;
 use super::{CliError, cameras, computing, loopback, settings};
 use crate::terminal::print_to_stdout;
-use bokehcam::v4l2::node::{Node, list_nodes};
+use bokehcam_live::v4l2::node::{Node, list_nodes};
 
 /// The JSON form of everything that was found.
 #[derive(Serialize)]

@@ -6,9 +6,9 @@ use std::path::Path;
 use super::cameras::report_denied;
 use super::finding::Finding;
 use super::system::System;
-use bokehcam::v4l2::holders::list_holders;
-use bokehcam::v4l2::loopback::{self, modprobe_command};
-use bokehcam::v4l2::node::{Kind, Node};
+use bokehcam_live::v4l2::holders::list_holders;
+use bokehcam_live::v4l2::loopback::{self, modprobe_command};
+use bokehcam_live::v4l2::node::{Kind, Node};
 
 pub const TOPIC: &str = "virtual camera";
 

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use super::finding::Finding;
 use super::system::System;
-use bokehcam::pipewire::PipeWireError;
-use bokehcam::pipewire::graph::Graph;
+use bokehcam_live::pipewire::PipeWireError;
+use bokehcam_live::pipewire::graph::Graph;
 
 pub const TOPIC: &str = "PipeWire";
 

@@ -21,10 +21,10 @@ use crate::terminal::{Progress, print_to_stderr, stop_flag_between};
 use bokehcam::compute::{Backend, memory};
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::depth::backdrop::Background;
-use bokehcam::files::place;
 use bokehcam::look::Look;
-use bokehcam::recording::still::PhotoFormat;
-use bokehcam::source::DepthChoice;
+use bokehcam_live::source::DepthChoice;
+use bokehcam_media::files::place;
+use bokehcam_media::recording::still::PhotoFormat;
 
 /// Peak memory per pixel of reading, blurring and encoding a picture.
 const BYTES_PER_PIXEL: u64 = 120;

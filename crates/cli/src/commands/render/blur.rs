@@ -9,7 +9,7 @@ use bokehcam::computing::ComputeOptions;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::engine::still::{Depth, Rendered, render_picture};
 use bokehcam::look::Look;
-use bokehcam::recording::Photo;
+use bokehcam_media::recording::Photo;
 
 /// Blurs a photo; returns a description of the executor.
 pub(super) fn blur(

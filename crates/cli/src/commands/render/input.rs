@@ -12,12 +12,12 @@ use bokehcam::depth::matting::mask::{Outline, depth_from_mask};
 use bokehcam::engine::still::Depth;
 use bokehcam::frame::{ColorImage, DepthMap, Mask};
 use bokehcam::look::{Look, Refine};
-use bokehcam::recording::depth_file::DepthFile;
-use bokehcam::recording::mask_file::{self, MaskFile};
-use bokehcam::recording::{Photo, snapshot};
-use bokehcam::source::orientation::transform_photo;
-use bokehcam::source::photo::{self, PhotoDepth};
-use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile};
+use bokehcam_live::source::orientation::transform_photo;
+use bokehcam_live::source::photo::{self, PhotoDepth};
+use bokehcam_live::source::{self, DepthChoice, DepthOrigin, PlateFile};
+use bokehcam_media::recording::depth_file::DepthFile;
+use bokehcam_media::recording::mask_file::{self, MaskFile};
+use bokehcam_media::recording::{Photo, snapshot};
 
 /// Input of the blur.
 pub(super) struct Input {

@@ -9,9 +9,9 @@ use glob::MatchOptions;
 
 use crate::error::CliError;
 use crate::log;
-use bokehcam::files::place;
-use bokehcam::recording::still::{self, PhotoFormat};
-use bokehcam::source::photo;
+use bokehcam_live::source::photo;
+use bokehcam_media::files::place;
+use bokehcam_media::recording::still::{self, PhotoFormat};
 
 /// As in a shell: `*` neither matches a separator nor hidden files.
 const LIKE_A_SHELL: MatchOptions =

@@ -34,11 +34,11 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::number::whole_number_parser;
 use bokehcam::look::{ApertureSetting, Look, LookError, LookFacts, Refine};
 use bokehcam::names;
-use bokehcam::recording::depth_file::DepthUnit;
-use bokehcam::recording::snapshot;
-use bokehcam::recording::still::PhotoFormat;
-use bokehcam::source::photo;
-use bokehcam::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
+use bokehcam_live::source::photo;
+use bokehcam_live::source::{self, DepthChoice, DepthOrigin, PlateFile, SingleCameraDepth};
+use bokehcam_media::recording::depth_file::DepthUnit;
+use bokehcam_media::recording::snapshot;
+use bokehcam_media::recording::still::PhotoFormat;
 
 /// Largest change of a mask, in pixels.
 const MAX_MASK_PX: u16 = 200;

@@ -13,18 +13,18 @@ use crate::log;
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::ExecutorFactory;
-#[cfg(feature = "desktop")]
-use bokehcam::control::bus;
-use bokehcam::control::{Answer, Claim, Server, Status};
-use bokehcam::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
-use bokehcam::files::user_folders::{Folders, timestamped_stem};
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Change, Look, LookFacts, Patch};
-use bokehcam::pipeline::{ChangeSender, Progress};
-use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::sink::ShutterControl;
-use bokehcam::source::{DepthOrigin, Kind};
-use bokehcam::stats::FrameRateMeter;
+#[cfg(feature = "desktop")]
+use bokehcam_live::control::bus;
+use bokehcam_live::control::{Answer, Claim, Server, Status};
+use bokehcam_live::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
+use bokehcam_live::pipeline::{ChangeSender, Progress};
+use bokehcam_live::sink::ShutterControl;
+use bokehcam_live::source::{DepthOrigin, Kind};
+use bokehcam_live::stats::FrameRateMeter;
+use bokehcam_media::files::user_folders::{Folders, timestamped_stem};
+use bokehcam_media::recording::snapshot::{self, Snapshot};
 
 /// Maximum wait for a picture to save.
 const PICTURE_TIMEOUT: Duration = Duration::from_secs(2);

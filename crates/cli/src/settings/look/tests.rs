@@ -96,7 +96,7 @@ fn the_range_of_focus_reaches_the_lens() {
 
 /// Returns looks that differ from the default in one field each, in every form of that field.
 fn looks(picture: &std::path::Path) -> Vec<Look> {
-    bokehcam::source::register_look_files();
+    bokehcam_live::source::register_look_files();
     let plain = Look::default();
     let mut looks = vec![plain.clone()];
     let mut add = |change: &dyn Fn(&mut Look)| {
@@ -155,7 +155,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
 fn the_flags_of_a_look_give_the_look() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a cat's, odd: name.png");
-    bokehcam::recording::still::write_color(
+    bokehcam_media::recording::still::write_color(
         &picture,
         &ColorImage { rgb: vec![200; 18], ..ColorImage::new(3, 2) },
         false,

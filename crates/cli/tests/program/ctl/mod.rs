@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 
 use bokehcam::budget::Quality;
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::snapshot;
-use bokehcam::recording::still::{read_color, write_color};
+use bokehcam_media::recording::snapshot;
+use bokehcam_media::recording::still::{read_color, write_color};
 use serde_json::json;
 
 use crate::program::PORTRAIT;

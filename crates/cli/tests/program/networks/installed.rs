@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::DepthMap;
-use bokehcam::network::{KNOWN_NETWORKS, KnownNetwork, Task};
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, Task};
 
 use super::onnx::matte;
 use super::{WEIGHTS, disc, read, real, written};

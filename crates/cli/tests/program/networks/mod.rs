@@ -12,10 +12,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::network::{self, Tensor};
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::{self, Tensor};
 use onnx::{Side, constant, conv, matte, model, node, port};
 use tempfile::TempDir;
 

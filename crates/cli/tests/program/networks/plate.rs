@@ -1,9 +1,9 @@
 //! Segmentation by background plate: combined with networks, and compared with a depth sensor on a real sequence.
 
 use bokehcam::depth::plate::{PlateDepth, Step};
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::Task;
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::Task;
 
 use tempfile::TempDir;
 

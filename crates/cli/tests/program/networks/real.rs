@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::network::{KNOWN_NETWORKS, Task, Tensor};
-use bokehcam::recording::{Options, Recording, Scratch};
-use bokehcam::source::installed::find_best_in;
+use bokehcam_live::source::installed::find_best_in;
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_media::network::{KNOWN_NETWORKS, Task, Tensor};
+use bokehcam_media::recording::{Options, Recording, Scratch};
 
 use super::read;
 use crate::program::Home;
@@ -115,12 +115,12 @@ fn a_photo_alone_has_the_depth_of_the_installed_network_in_every_command() {
     let home = Home::new();
     home.run(&["models", "add", model(Task::Matte).to_str().unwrap()]).done();
     let (color, _) = Sequence::open().frame(0);
-    bokehcam::recording::still::write_color(&home.path("photo.png"), &color, false).unwrap();
+    bokehcam_media::recording::still::write_color(&home.path("photo.png"), &color, false).unwrap();
     let ran = home.run(&["render", "photo.png", "--out", "r.png", "--backend", "cpu"]);
     let said = ran.done();
     assert!(said.contains("depth by selfie-landscape") && !said.contains("warning"), "{said}");
     home.run(&["stream", "photo.png", "--to", "s/", "--backend", "cpu"]).done();
-    let read = |name: &str| bokehcam::recording::still::read_color(&home.path(name)).unwrap();
+    let read = |name: &str| bokehcam_media::recording::still::read_color(&home.path(name)).unwrap();
     assert!(read("r.png") == read("s/000000.png"));
 }
 
@@ -132,7 +132,7 @@ fn nobody_in_a_picture_is_said() {
     for task in [Task::Matte, Task::Mono] {
         home.run(&["models", "add", model(task).to_str().unwrap()]).done();
     }
-    bokehcam::recording::still::write_color(&home.path("0.png"), &ColorImage::new(320, 240), false).unwrap();
+    bokehcam_media::recording::still::write_color(&home.path("0.png"), &ColorImage::new(320, 240), false).unwrap();
     for depth in ["auto", "matte", "matte,mono"] {
         let ran = home.run(&["render", "0.png", "--depth", depth, "--out", "x.png", "--force"]);
         assert!(ran.warning().contains("no person was found in the picture"), "{depth}: {}", ran.stderr);
@@ -144,8 +144,8 @@ fn shipped() -> PathBuf {
     PathBuf::from(folder).join(KNOWN_NETWORKS[0].file)
 }
 
-fn load(file: &Path) -> bokehcam::network::Network {
-    bokehcam::network::load(file).unwrap().network
+fn load(file: &Path) -> bokehcam_media::network::Network {
+    bokehcam_media::network::load(file).unwrap().network
 }
 
 #[test]

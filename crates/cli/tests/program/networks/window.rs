@@ -3,7 +3,7 @@
 use std::fs;
 
 use bokehcam::look::Look;
-use bokehcam::source::{DepthChoice, Options};
+use bokehcam_live::source::{DepthChoice, Options};
 use bokehcam_window::services::Services;
 use bokehcam_window::state::DepthMethod;
 use bokehcam_window::system::System;

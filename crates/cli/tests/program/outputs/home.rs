@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use bokehcam::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::tum::{Writer, WriterOptions};
 use rustix::process::Signal;
 
 use crate::common::{Numbers, color, depth};

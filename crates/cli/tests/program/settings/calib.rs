@@ -3,7 +3,7 @@
 use std::fs;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still::{read_disparity, write_color};
+use bokehcam_media::recording::still::{read_disparity, write_color};
 
 use crate::common::{color, grain};
 use crate::program::Home;

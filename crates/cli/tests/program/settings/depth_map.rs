@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use bokehcam::recording::still;
+use bokehcam_media::recording::still;
 
 use crate::program::{Home, Ran};
 

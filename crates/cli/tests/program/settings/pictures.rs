@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
-use bokehcam::recording::still;
+use bokehcam_media::recording::still;
 
 use crate::common;
 use crate::program::Home;

@@ -5,8 +5,8 @@ use std::fs;
 use bokehcam::bokeh::{self, BokehError, Method, Rank, Settings, aperture::Aperture};
 use bokehcam::budget::Quality;
 use bokehcam::optics::CocKind;
-use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::recording::still;
+use bokehcam_media::recording::snapshot::{self, Snapshot};
+use bokehcam_media::recording::still;
 
 use crate::program::Home;
 

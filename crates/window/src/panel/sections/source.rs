@@ -7,7 +7,7 @@ use crate::panel::widgets::{Number, add_choice, add_dropdown, add_number, add_re
 use crate::services::PathKind;
 use crate::state::{Action, DepthMethod, Source};
 use crate::texts::{tr, tr_with};
-use bokehcam::camera_control::CameraControl;
+use bokehcam_live::camera_control::CameraControl;
 
 /// The depth methods with their tooltips.
 const DEPTH_METHODS: [(&str, &str, DepthMethod); 5] = [

@@ -12,7 +12,7 @@ use crate::state::{Action, Source, State, Transport, sample};
 use bokehcam::depth::plate::Step;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::Effect;
-use bokehcam::recording::still::{read_color, write_color};
+use bokehcam_media::recording::still::{read_color, write_color};
 
 /// Returns a test picture in the given size.
 fn backdrop((width, height): (u32, u32)) -> ColorImage {

@@ -4,12 +4,12 @@ use std::str::FromStr;
 
 use super::super::{SaveOptions, SessionEvent, Still, held};
 use super::SessionWorker;
-use bokehcam::control::Answer;
 use bokehcam::engine::Images;
-use bokehcam::files::user_folders as folders;
 use bokehcam::look::{Look, Patch};
-use bokehcam::recording::snapshot::{self, Snapshot};
-use bokehcam::source::{Kind, SourceName};
+use bokehcam_live::control::Answer;
+use bokehcam_live::source::{Kind, SourceName};
+use bokehcam_media::files::user_folders as folders;
+use bokehcam_media::recording::snapshot::{self, Snapshot};
 
 /// Number of recent looks kept for snapshots: a frame in flight has one of the last few.
 const MAX_KEPT_LOOKS: usize = 512;

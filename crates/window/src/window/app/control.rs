@@ -12,11 +12,11 @@ use crate::remote_changes::RemoteChanges;
 use crate::session::SnapshotRequest;
 use crate::state::{Action, DepthMethod, Source};
 use crate::window::{RemoteConfig, UserEvent};
-use bokehcam::control::{Answer, Server, Status};
-use bokehcam::controller::{Changed, ControllableRun, Controller, refuse_look};
 use bokehcam::look::{Change, Look, Patch};
-use bokehcam::sink::ShutterControl;
-use bokehcam::source::DepthOrigin;
+use bokehcam_live::control::{Answer, Server, Status};
+use bokehcam_live::controller::{Changed, ControllableRun, Controller, refuse_look};
+use bokehcam_live::sink::ShutterControl;
+use bokehcam_live::source::DepthOrigin;
 
 /// Timeout for replies of the window's thread, and for saving pictures.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(3);

@@ -11,7 +11,7 @@ use bokehcam::engine::Images;
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::View;
+use bokehcam_live::pipeline::View;
 
 /// Time a window must be hidden before the source pauses, so that switching windows does not pause it.
 const PAUSE_DELAY: Duration = Duration::from_secs(2);

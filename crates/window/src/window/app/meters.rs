@@ -1,6 +1,6 @@
 //! Measures the window: for the report, and for the frame rate of its status.
 
-use bokehcam::stats::{FrameRateMeter, Histogram, WindowStats};
+use bokehcam_live::stats::{FrameRateMeter, Histogram, WindowStats};
 
 /// Measurements since the start of the preview.
 pub(super) struct Meters {

@@ -32,7 +32,7 @@ use bokehcam::depth::plate::Guide;
 use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::pipeline::{OutputRequest, View};
+use bokehcam_live::pipeline::{OutputRequest, View};
 
 /// Maximum interval of polling the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(250);

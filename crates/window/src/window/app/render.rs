@@ -13,7 +13,7 @@ use crate::session::SaveOptions;
 use crate::state::{Action, Request, Source, State, ViewMode};
 use bokehcam::compute::PictureLocation;
 use bokehcam::frame::ColorImage;
-use bokehcam::sink::card;
+use bokehcam_live::sink::card;
 
 /// Shown if there is nothing to save.
 const NO_PICTURE: &str = "There is no picture to save.";

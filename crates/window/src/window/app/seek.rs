@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::App;
 use crate::state::Transport;
-use bokehcam::capture::Seeker;
-use bokehcam::pipeline::View;
+use bokehcam_live::capture::Seeker;
+use bokehcam_live::pipeline::View;
 
 /// State of seek requests.
 #[derive(Default)]

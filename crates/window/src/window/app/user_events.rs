@@ -9,7 +9,7 @@ use super::App;
 use super::held_frame::focus_distance_m;
 use crate::panel::SystemFonts;
 use crate::window::{ThemeChoice, UserEvent, desktop};
-use bokehcam::pipeline::View;
+use bokehcam_live::pipeline::View;
 
 /// Sets the theme and the system fonts, and subscribes to their changes. Sends after the event loop has ended are
 /// ignored.

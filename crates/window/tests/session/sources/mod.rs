@@ -10,8 +10,8 @@ use std::sync::atomic::Ordering;
 
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Strength};
-use bokehcam::recording::{snapshot, still};
-use bokehcam::source::{self, Options, SourceName};
+use bokehcam_live::source::{self, Options, SourceName};
+use bokehcam_media::recording::{snapshot, still};
 use bokehcam_window::state::{Output, Request, Source, Update};
 
 use plug::*;
@@ -113,7 +113,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let mut opened = open(&kept).unwrap();
     assert!(opened.has_depth());
     let (mut into, mut no_depth, mut right) = Default::default();
-    let shot = bokehcam::capture::FrameBuffers { color: &mut into, depth: &mut no_depth, right: &mut right };
+    let shot = bokehcam_live::capture::FrameBuffers { color: &mut into, depth: &mut no_depth, right: &mut right };
     opened.camera.next(shot).unwrap();
     assert!(into == color, "the picture before the blur");
     still::write_depth(&folder.path().join("kept-2-depth.pfm"), &DepthMap::new(80, 30), 1000.0, true).unwrap();

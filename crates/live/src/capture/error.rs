@@ -1,0 +1,102 @@
+//! Errors of frame sources.
+
+#[cfg(feature = "camera")]
+use super::pixels::NoColor;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+use crate::pipewire::PipeWireError;
+#[cfg(feature = "camera")]
+use crate::v4l2::live::OpenError;
+use bokehcam::frame::transform::Area;
+use bokehcam_media::recording::RecordingError;
+use bokehcam_media::video::VideoError;
+
+/// Why a source delivers no frame.
+#[allow(missing_docs)] // The messages say what the fields are.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The recording's picture cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The video file cannot be read.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// A stream is not y4m, or ends too early.
+    #[error("{source_name}: {what}")]
+    Y4m {
+        source_name: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
+    /// No frame lies between start and end.
+    #[error(
+        "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",
+        end_s.map_or("its end".into(), |end_s| format!("{end_s} s"))
+    )]
+    EmptyRange {
+        source_name: String,
+        /// Start of the range.
+        start_s: f64,
+        /// End of the range.
+        end_s: Option<f64>,
+        /// Time from the first frame to the end of the last one.
+        length_s: f64,
+    },
+    /// A picture size or rate that is not supported.
+    #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
+    Format { width: u32, height: u32, fps: f64 },
+    /// The program was built without a synthetic camera.
+    #[error(
+        "synthetic: this program was built without that scene; build it with the feature lab, or use `demo`, a \
+         recording of it"
+    )]
+    NoSynthetic,
+    /// The built-in demonstration cannot be decoded.
+    #[error("demo: it cannot be decoded: {0}")]
+    Demo(String),
+    /// Side-by-side pictures need an even width.
+    #[error(
+        "--side-by-side: the pictures of {source_name} are {width}x{height}; left and right pictures side by side need \
+         an even width"
+    )]
+    OddWidth { source_name: String, width: u32, height: u32 },
+    /// Side-by-side needs both views in one picture.
+    #[error("--side-by-side needs pictures that show left and right side by side, and those of {source_name} do not")]
+    NotSideBySide { source_name: String },
+    /// Both cameras need the same size.
+    #[error(
+        "{} gives {}x{} and {} gives {}x{}: both cameras need the same size; choose one that both support with --size",
+        names[0], left.0, left.1, names[1], right.0, right.1
+    )]
+    SizesDiffer {
+        /// Left camera, then right camera.
+        names: [String; 2],
+        /// Width and height of the left pictures.
+        left: (u32, u32),
+        /// Width and height of the right pictures.
+        right: (u32, u32),
+    },
+    /// The part to keep is not within the pictures.
+    #[error(
+        "--crop {}: the pictures of {source_name} are {}x{} after --rotate; choose a part of them",
+        area.map(|area| area.to_string()).unwrap_or_default(), size_px.0, size_px.1
+    )]
+    AreaOutside {
+        source_name: String,
+        /// The part to keep.
+        area: Option<Area>,
+        /// Width and height of the pictures once they are rotated.
+        size_px: (u32, u32),
+    },
+    /// The camera cannot be opened.
+    #[cfg(feature = "camera")]
+    #[error(transparent)]
+    Camera(#[from] OpenError),
+    /// The PipeWire camera cannot be opened.
+    #[cfg(all(feature = "camera", feature = "pipewire"))]
+    #[error(transparent)]
+    PipeWire(#[from] PipeWireError),
+    /// The camera delivers no colour pictures.
+    #[cfg(feature = "camera")]
+    #[error("{camera}: {source}")]
+    NoColor { camera: String, source: NoColor },
+}

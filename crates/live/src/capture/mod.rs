@@ -1,0 +1,128 @@
+//! Sources of frames.
+
+pub mod background;
+pub mod demo;
+mod error;
+pub mod photo;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+pub mod pipewire;
+pub mod pixels;
+pub mod replay;
+mod seek;
+pub mod side_by_side;
+pub mod stereo_pair;
+pub mod synthetic;
+pub mod transformed;
+#[cfg(feature = "camera")]
+pub mod v4l2;
+pub mod video;
+pub mod y4m;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+pub use error::CaptureError;
+pub use seek::{SeekRequest, Seeker};
+
+use crate::stats::DropCause;
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+
+/// A source of frames.
+pub trait Camera: Send {
+    /// Describes this camera; constant during a run.
+    fn info(&self) -> SourceInfo;
+
+    /// Reads the next frame into `buffers`, as far as the camera [delivers them](SourceInfo::frame_data). A
+    /// live camera waits for the frame, but not much longer than [`MAX_WAIT`]; for other cameras, the caller paces the
+    /// frames. On any result but [`Captured::Frame`] the content of the buffers is unspecified.
+    ///
+    /// # Errors
+    /// The camera failed, and will deliver no more frames.
+    fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError>;
+
+    /// Skips the frames before media time `until_ns` without reading them; returns how many were skipped. Live cameras
+    /// (see [`SourceInfo::live`]) cannot skip and return 0.
+    fn skip_until(&mut self, until_ns: u64) -> u64 {
+        let _ = until_ns;
+        0
+    }
+
+    /// Returns how long the last call of [`Camera::next`] waited for the frame, in nanoseconds.
+    fn waited_ns(&self) -> u64 {
+        0
+    }
+
+    /// Returns the handle that requests frames by position, if the camera can seek.
+    fn seeker(&self) -> Option<Arc<Seeker>> {
+        None
+    }
+
+    /// Seeks to a frame, by its position in the [seeker](Camera::seeker): it is read next, and media time continues as
+    /// if it followed the previous frame. Returns how far, in nanoseconds, the source's own time is then ahead of media
+    /// time.
+    fn seek(&mut self, position: usize) -> i64 {
+        let _ = position;
+        0
+    }
+
+    /// Releases the device, if there is one, until [`Camera::next`] is called again: no client watches.
+    fn suspend(&mut self) {}
+}
+
+/// Buffers for a frame. Those that the camera does not deliver stay unchanged.
+#[derive(Debug)]
+pub struct FrameBuffers<'a> {
+    /// The picture; with a stereo camera, the left one.
+    pub color: &'a mut ColorImage,
+    /// Its ground-truth depth.
+    pub depth: &'a mut DepthMap,
+    /// The right camera's picture, captured at the same time and of the same size.
+    pub right: &'a mut GrayImage,
+}
+
+/// The data that a camera delivers with each frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameData {
+    /// The picture only.
+    Color,
+    /// The picture and its ground-truth depth.
+    Depth,
+    /// The left and the right camera's pictures.
+    RightCamera,
+}
+
+/// Longest wait of a live camera in [`Camera::next`] before it returns [`Captured::Waiting`].
+pub const MAX_WAIT: Duration = Duration::from_millis(100);
+
+/// Properties of a camera.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// Name for the report and for messages.
+    pub name: String,
+    /// Width and height of every frame, in pixels.
+    pub size: (u32, u32),
+    /// Time between frames, > 0.
+    pub period_ns: u64,
+    /// Number of frames until the end, if known: for a progress bar.
+    pub frames: Option<u64>,
+    /// Whether frames arrive at their own pace. Otherwise they can be read and skipped at will, and a real-time run
+    /// waits for their media time.
+    pub live: bool,
+    /// The data in each frame.
+    pub frame_data: FrameData,
+}
+
+/// Result of reading a frame.
+#[derive(Debug)]
+pub enum Captured {
+    /// A frame.
+    Frame(Stamp),
+    /// Number of frames lost before they could be read. Not the end: the next call continues.
+    Lost(u64, DropCause),
+    /// No frame yet; the camera may be absent for a while. The caller checks whether to stop, and calls again.
+    Waiting,
+    /// A frame that cannot be decoded.
+    Corrupt(CaptureError),
+    /// There are no more frames.
+    End,
+}

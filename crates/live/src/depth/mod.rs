@@ -1,0 +1,3 @@
+//! Depth from cameras.
+
+pub mod live;

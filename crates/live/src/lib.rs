@@ -1,0 +1,40 @@
+//! Cameras, outputs, and the threads of a run of bokehcam.
+//!
+//! A stream flows in one direction; only empty buffers return:
+//!
+//! ```text
+//! capture ──> depth ──> bokeh ──> sink
+//!    colour     + depth    blurred   file, stream, window
+//! ```
+//!
+//! [`source`] opens cameras and recordings by name, and [`pipeline`] runs them into a [`sink`].
+//!
+//! | layer | modules |
+//! |---|---|
+//! | 4 | `controller`: answers requests to a run, by the same code for a stream and a preview |
+//! | 3 | [`source`]: cameras, recordings and their depth, by name |
+//! | 2 | [`pipeline`]: the threads of a run |
+//! | 1 | [`capture`], [`depth`] (of depth cameras), [`sink`]: what a run begins and ends with |
+//! | 0 | [`stats`] (the report), `v4l2`, `pipewire`, `control` (the socket of `ctl`), [`camera_control`] |
+//!
+//! `unsafe` is allowed in `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`, and under `v4l2`, where each
+//! block has its safety argument.
+
+pub mod camera_control;
+pub mod capture;
+#[doc(hidden)]
+pub mod control;
+#[doc(hidden)]
+pub mod controller;
+#[cfg(feature = "camera")]
+pub mod depth;
+pub mod pipeline;
+#[cfg(feature = "pipewire")]
+#[doc(hidden)]
+pub mod pipewire;
+pub mod sink;
+pub mod source;
+pub mod stats;
+#[cfg(feature = "camera")]
+#[doc(hidden)]
+pub mod v4l2;

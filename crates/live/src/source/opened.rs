@@ -1,0 +1,184 @@
+//! Opens a camera, recording or scene by name, with its recorded depth.
+
+use std::sync::Arc;
+
+#[cfg(feature = "camera")]
+use super::name;
+use super::{
+    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo,
+    registration, video,
+};
+use crate::capture::Camera;
+use crate::capture::demo::Demo;
+use crate::capture::photo::Photo;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+use crate::capture::pipewire::PipeWireCamera;
+use crate::capture::replay::Replay;
+#[cfg(feature = "camera")]
+use crate::capture::stereo_pair::StereoPair;
+use crate::capture::synthetic::{self, Format};
+#[cfg(feature = "camera")]
+use crate::capture::v4l2::V4l2Camera;
+use crate::capture::y4m::Y4m;
+#[cfg(feature = "camera")]
+use crate::v4l2::live::ModeRequest;
+#[cfg(feature = "camera")]
+use bokehcam::clock::Clock;
+use bokehcam::compute::thread_pool::core_count;
+use bokehcam::depth::DepthSource;
+use bokehcam::depth::constant::ConstantDepth;
+use bokehcam::depth::misalignment::Misalignment;
+use bokehcam::frame::DepthMap;
+use bokehcam_media::depth::recorded::RecordedDepth;
+#[cfg(feature = "camera")]
+use bokehcam_media::layout::Content;
+use bokehcam_media::recording::depth_file::describe_stretch;
+use bokehcam_media::recording::{Recording, StereoGeometry};
+
+/// Picture size of the synthetic scene.
+const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
+/// Frame rate of the synthetic scene.
+const SYNTHETIC_FPS: f64 = 30.0;
+
+/// An opened source before stereo matching is set up.
+pub(super) struct Opened {
+    pub camera: Box<dyn Camera>,
+    pub depth: Option<Box<dyn DepthSource>>,
+    pub depth_from: DepthOrigin,
+    pub first_depth: Option<DepthMap>,
+    /// What the files say besides.
+    pub findings: Findings,
+    /// The stereo geometry that the source states.
+    pub pair: StereoGeometry,
+    /// The number of disparities, if a recording states it.
+    pub disparities: Option<u32>,
+}
+
+impl Opened {
+    /// Opens the source; right pictures are read only if stereo matching will use them.
+    pub fn open(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
+        let Options { frames, depth_choice, .. } = request.options;
+        let without_depth = |camera| Self {
+            camera,
+            depth: None,
+            depth_from: DepthOrigin::Nothing,
+            first_depth: None,
+            findings: Findings::default(),
+            pair: StereoGeometry::Uncalibrated,
+            disparities: None,
+        };
+        match name {
+            SourceName::Synthetic => {
+                let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
+                let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
+                let format = Format { size, fps, frames: frames.frames, threads: core_count() };
+                Ok(without_depth(synthetic::open_camera(format)?))
+            }
+            SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
+            SourceName::Folder(folder) => {
+                let is_depth_used = matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
+                let recording = Arc::new(registration::open_recording(folder, is_depth_used, request.options)?);
+                let name = folder.display().to_string();
+                warn_of_own_properties(&recording, frames);
+                let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;
+                let pair = recording.stereo_geometry().cloned();
+                if pair.is_some() && request.uses_stereo(recording.has_depth()) {
+                    camera = camera.with_right_camera();
+                }
+                let disparities = recording.disparity_count();
+                let depth_from = recorded_depth_origin(&recording);
+                let first_depth = request.read_first_depth(&recording);
+                let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
+                let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
+                let picture_stems = recording.picture_stems();
+                let depth = match recording.has_depth() {
+                    true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
+                    false => None,
+                };
+                Ok(Self {
+                    depth,
+                    depth_from,
+                    first_depth,
+                    findings: Findings { notes, picture_stems, ..Findings::default() },
+                    pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
+                    disparities,
+                    ..without_depth(Box::new(camera))
+                })
+            }
+            SourceName::Photo(path) => {
+                let photo::ReadPhoto { color, depth, depth_from, mut findings } = photo::read_photo(path, request)?;
+                let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
+                findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());
+                let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
+                let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
+                Ok(Self { depth, depth_from, findings, ..without_depth(Box::new(camera)) })
+            }
+            SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
+            SourceName::Video(path) => {
+                // A seek would lose count of the frames.
+                Ok(without_depth(Box::new(video::open(path, frames, depth_choice.counts_frames())?)))
+            }
+            #[cfg(feature = "camera")]
+            SourceName::Camera(camera) => {
+                let camera =
+                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), frames.frames)?;
+                Ok(without_depth(Box::new(camera)))
+            }
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(name) => {
+                if let Some((control, value)) = frames.control.first() {
+                    let what =
+                        format!("--control {control}={value}: a PipeWire camera has no controls; use its /dev/videoN");
+                    return SourceError::usage_error(what);
+                }
+                Ok(without_depth(Box::new(PipeWireCamera::open(
+                    name,
+                    request.options.filters,
+                    camera_request(frames),
+                    frames.frames,
+                )?)))
+            }
+            #[cfg(feature = "camera")]
+            SourceName::Cameras([left, right]) => {
+                let open = |camera: &name::NamedCamera| {
+                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), None)
+                };
+                let pair = StereoPair::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
+                Ok(without_depth(Box::new(pair)))
+            }
+        }
+    }
+}
+
+/// Returns the kind of a recording's depth.
+pub(super) fn recorded_depth_origin(recording: &Recording) -> DepthOrigin {
+    match recording.has_depth() {
+        false => DepthOrigin::Nothing,
+        true if recording.has_relative_depth() => DepthOrigin::Relative,
+        true if recording.has_depth_in_units() => DepthOrigin::Units,
+        true => DepthOrigin::Metres,
+    }
+}
+
+/// Warns of options that a recording has no use for.
+fn warn_of_own_properties(recording: &Recording, frames: &Frames) {
+    if let Some(fps) = frames.fps.filter(|_| recording.has_times()) {
+        tracing::warn!("without effect here: --fps {fps} (a recording has its own)");
+    }
+    if !frames.topic.is_empty() && !recording.has_topics() {
+        tracing::warn!("without effect here: --topic {} (the recording has no topics)", frames.topic.join(","));
+    }
+    if let Some(Size { width, height }) = frames.size.filter(|_| !recording.is_chosen_by_size()) {
+        tracing::warn!("without effect here: --size {width}x{height} (a recording has its own)");
+    }
+}
+
+#[cfg(feature = "camera")]
+fn camera_request(frames: &Frames) -> ModeRequest {
+    ModeRequest {
+        content: Content::Color,
+        size_px: frames.size.map(|size| (size.width, size.height)),
+        fps: frames.fps,
+        fourcc: frames.format,
+    }
+}

@@ -1,0 +1,140 @@
+//! Person mask from a network, temporally smoothed where it is unsure.
+
+use super::mask_postprocess::MaskPostProcessor;
+use super::picture_network::{NetworkOutput, PictureNetwork};
+use bokehcam::frame::{ColorImage, Mask};
+
+/// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
+const PREVIOUS_WEIGHT: f32 = 0.8;
+const FRAME_NS: f32 = 1e9 / 30.0;
+
+/// Computes the person mask from frame to frame.
+pub struct PersonSegmenter {
+    picture_network: PictureNetwork,
+    /// The network's mask after temporal smoothing.
+    smoothed: Mask,
+    mask_postprocess: MaskPostProcessor,
+    mask: Mask,
+    /// Whether the network outputs logits: values outside of 0 to 1 were seen.
+    is_logits: bool,
+    /// When the previous picture was taken.
+    seen_ns: Option<u64>,
+    /// Whether the mask is that of an earlier picture, from which the last one hardly differs.
+    is_still: bool,
+}
+
+impl PersonSegmenter {
+    pub fn new(picture_network: PictureNetwork) -> Self {
+        Self {
+            picture_network,
+            smoothed: Mask::default(),
+            mask_postprocess: MaskPostProcessor::default(),
+            mask: Mask::default(),
+            is_logits: false,
+            seen_ns: None,
+            is_still: false,
+        }
+    }
+
+    /// Resets the state, for a new scene.
+    pub fn reset(&mut self) {
+        self.picture_network.reset();
+        self.mask_postprocess.reset();
+        self.seen_ns = None;
+    }
+
+    /// Sets whether the mask of an earlier picture serves for one that hardly differs.
+    pub fn set_reuse(&mut self, on: bool) {
+        self.picture_network.set_reuse(on);
+    }
+
+    /// Returns whether the mask of an earlier picture served for the last one.
+    pub fn is_still(&self) -> bool {
+        self.is_still
+    }
+
+    /// Returns the mask of the last picture.
+    pub fn mask(&self) -> &Mask {
+        &self.mask
+    }
+
+    /// Computes the mask of a picture taken at `time_ns`. Undecided pixels are averaged with the previous frame's and
+    /// decided ones not, so that nothing lags (as in MediaPipe).
+    ///
+    /// # Errors
+    /// See [`PictureNetwork::infer`].
+    pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
+        self.picture_network.set_picture(color);
+        self.is_still = self.picture_network.is_still();
+        if self.is_still {
+            return Ok(());
+        }
+        let output = self.picture_network.run()?;
+        let pixels = output.size.0 * output.size.1;
+        let beyond = |alpha: f32| !(-0.01..=1.01).contains(&alpha);
+        self.is_logits |= (0..pixels).any(|pixel| beyond(output.at(pixel, output.channels - 1)));
+        let size = (output.size.0 as u32, output.size.1 as u32);
+        let before_ns = self.seen_ns.filter(|_| (self.smoothed.width, self.smoothed.height) == size);
+        let previous_weight = before_ns.map_or(0.0, |before_ns| previous_weight(time_ns.abs_diff(before_ns)));
+        self.smoothed.resize(size.0, size.1);
+        for (pixel, alpha) in self.smoothed.alpha.iter_mut().enumerate() {
+            let new = decode_alpha(&output, pixel, self.is_logits);
+            let keeps = previous_weight * uncertainty(new);
+            *alpha = new + (*alpha - new) * keeps;
+        }
+        self.seen_ns = Some(time_ns);
+        self.mask_postprocess.postprocess(&self.smoothed, time_ns, &mut self.mask);
+        Ok(())
+    }
+}
+
+/// Returns the weight of a previous frame so long ago: a person has moved by then.
+fn previous_weight(gap_ns: u64) -> f32 {
+    PREVIOUS_WEIGHT.powf((gap_ns as f32 / FRAME_NS).max(1.0))
+}
+
+/// Returns the mask value: of two channels, the second one is the person.
+fn decode_alpha(output: &NetworkOutput, pixel: usize, is_logits: bool) -> f32 {
+    let own = output.at(pixel, output.channels - 1);
+    match (is_logits, output.channels) {
+        (false, _) => own.clamp(0.0, 1.0),
+        (true, 1) => sigmoid(own),
+        (true, _) => sigmoid(own - output.at(pixel, 0)),
+    }
+}
+
+fn sigmoid(value: f32) -> f32 {
+    1.0 / (1.0 + (-value).exp())
+}
+
+/// Returns the uncertainty of a mask value: 1 at one half, 0 at 0 and 1. Approximates binary entropy by a power of a
+/// parabola.
+fn uncertainty(alpha: f32) -> f32 {
+    let off = 2.0 * alpha - 1.0;
+    (1.0 - off * off).max(0.0).powf(0.75)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_seen_long_ago_says_little() {
+        assert!(
+            (previous_weight(33_333_333) - 0.8).abs() < 1e-4 && previous_weight(0) == 0.8,
+            "nothing lags at a camera's pace"
+        );
+        assert!((previous_weight(66_666_666) - 0.64).abs() < 1e-4, "as if the missing one had been seen");
+        assert!(previous_weight(400_000_000) < 0.07);
+    }
+
+    #[test]
+    fn uncertainty_is_that_of_a_coin() {
+        for step in 1..100 {
+            let alpha = step as f32 / 100.0;
+            let entropy = -alpha * alpha.log2() - (1.0 - alpha) * (1.0 - alpha).log2();
+            assert!((uncertainty(alpha) - entropy).abs() < 0.03, "{alpha}: {} {entropy}", uncertainty(alpha));
+        }
+        assert_eq!((uncertainty(0.0), uncertainty(1.0), uncertainty(0.5)), (0.0, 0.0, 1.0));
+    }
+}

@@ -1,0 +1,228 @@
+//! Feeds pictures to a network: input layout and scaling, and the selection of its output.
+
+use super::stillness::StillnessDetector;
+use crate::network::{LoadedNetwork, Network, Port, Scaling, Task, Tensor};
+use bokehcam::frame::ColorImage;
+use bokehcam::frame::scale::RowScaler;
+
+/// Maximum side of a network's input picture, in pixels.
+const MAX_SIDE: usize = 1024;
+
+/// User-given properties of an unknown network; `None` is guessed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hints {
+    /// Scaling of the picture's codes.
+    pub scaling: Option<Scaling>,
+    /// Whether the channel order is blue, green, red.
+    pub bgr: Option<bool>,
+}
+
+/// A network with a picture input.
+pub struct PictureNetwork {
+    network: Network,
+    /// Columns and rows of the input picture.
+    size: (usize, usize),
+    /// Whether the input is planar (NCHW) or interleaved (NHWC).
+    is_planar: bool,
+    scaling: Scaling,
+    bgr: bool,
+    /// Index of the picture input, and of the output that is used.
+    picture: usize,
+    output: usize,
+    /// Recurrent states: pairs of an input and the output that feeds it for the next picture.
+    recurrent_states: Vec<(usize, usize)>,
+    inputs: Vec<Tensor>,
+    outputs: Vec<Tensor>,
+    scale: RowScaler,
+    row: Vec<u16>,
+    scaled: Vec<u8>,
+    /// Detects pictures like the last one that the network ran on; `None` runs it on every picture.
+    stillness: Option<StillnessDetector>,
+}
+
+/// A network's output: one or two channels, of the network's own size.
+#[derive(Clone, Copy, Debug)]
+pub struct NetworkOutput<'a> {
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Numbers per pixel.
+    pub channels: usize,
+    values: &'a [f32],
+    is_planar: bool,
+}
+
+impl NetworkOutput<'_> {
+    /// Returns the number of a channel at a pixel.
+    #[inline(always)]
+    pub fn at(&self, pixel: usize, channel: usize) -> f32 {
+        let pixels = self.size.0 * self.size.1;
+        self.values[if self.is_planar { channel * pixels + pixel } else { pixel * self.channels + channel }]
+    }
+}
+
+impl PictureNetwork {
+    /// Finds the inputs and outputs of a network.
+    ///
+    /// # Errors
+    /// The network does not take exactly one picture, takes other inputs than recurrent states and ratios, or has no
+    /// usable output.
+    pub fn new(LoadedNetwork { network, known }: LoadedNetwork, task: Task, hints: &Hints) -> Result<Self, String> {
+        let inputs = &network.inputs;
+        let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channel_axis(&inputs[k], &[3]).is_some()).collect();
+        let &[picture] = pictures.as_slice() else {
+            return Err(format!(
+                "{} of its inputs are pictures of three channels, and exactly one is needed",
+                pictures.len()
+            ));
+        };
+        let is_planar = channel_axis(&inputs[picture], &[3]) == Some(1);
+        let sides = if is_planar { [3, 2] } else { [2, 1] };
+        // For a variable input size: small, and divisible by the usual strides of networks.
+        let usual = match task {
+            Task::Matte => [256, 144],
+            Task::Mono => [320, 192],
+        };
+        let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
+        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+            return Err(format!(
+                "its input is {width} x {height} pixels, and at most {MAX_SIDE} per side are \
+                                supported"
+            ));
+        }
+        let outputs = &network.outputs;
+        let find_output = |named: bool| {
+            (0..outputs.len()).find(|&k| {
+                let name = outputs[k].name.to_lowercase();
+                (!named || ["pha", "alpha", "mask", "depth"].iter().any(|part| name.contains(part)))
+                    && channel_axis(&outputs[k], &[1, 2]).is_some()
+            })
+        };
+        let output = find_output(true).or_else(|| find_output(false)).or((outputs.len() == 1).then_some(0));
+        let output = output.ok_or("none of its outputs is a picture with one or two channels")?;
+        // Other inputs are recurrent states, in the order of the outputs (as in Robust Video Matting), or a ratio.
+        let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
+        let states =
+            (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
+        let recurrent_states: Vec<(usize, usize)> = others.clone().zip(states).collect();
+        if recurrent_states.len() != others.count() || recurrent_states.iter().any(|&(_, state)| state == output) {
+            return Err("it has inputs other than a picture and its own earlier output".to_owned());
+        }
+        let inputs = (0..inputs.len()).map(|k| match k {
+            _ if k == picture => Tensor::zeros(&if is_planar { [1, 3, height, width] } else { [1, height, width, 3] }),
+            _ if is_ratio(&inputs[k]) => Tensor { shape: vec![1], values: vec![1.0] },
+            // Variable sizes of states are 1 at first: one number is broadcast.
+            _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
+        });
+        let inputs = inputs.collect();
+        let usual = match task {
+            Task::Matte => Scaling::UNIT,
+            Task::Mono => Scaling::IMAGENET,
+        };
+        let scaling = hints.scaling.or(known.map(|known| known.scaling)).unwrap_or(usual);
+        let bgr = hints.bgr.or(known.map(|known| known.bgr)).unwrap_or(false);
+        Ok(Self {
+            network,
+            size: (width, height),
+            is_planar,
+            scaling,
+            bgr,
+            picture,
+            output,
+            recurrent_states,
+            inputs,
+            outputs: Vec::new(),
+            scale: RowScaler::default(),
+            row: Vec::new(),
+            scaled: Vec::new(),
+            stillness: None,
+        })
+    }
+
+    /// Resets the recurrent states, for a new scene.
+    pub fn reset(&mut self) {
+        for &(input, _) in &self.recurrent_states {
+            self.inputs[input].values.fill(0.0);
+        }
+        self.stillness.iter_mut().for_each(StillnessDetector::reset);
+    }
+
+    /// Sets whether [`Self::is_still`] looks for pictures that hardly differ.
+    pub fn set_reuse(&mut self, on: bool) {
+        if self.stillness.is_some() != on {
+            self.stillness = on.then(|| StillnessDetector::new(self.size));
+        }
+    }
+
+    /// Whether the picture that was set hardly differs from the last one for which this returned false, so that the
+    /// network would return the same.
+    pub fn is_still(&mut self) -> bool {
+        self.stillness.as_mut().is_some_and(StillnessDetector::is_still)
+    }
+
+    /// Runs the network on the picture set by [`Self::set_picture`].
+    ///
+    /// # Errors
+    /// The runtime fails, or the output is no picture of finite numbers.
+    pub fn run(&mut self) -> Result<NetworkOutput<'_>, String> {
+        self.network.run(&self.inputs, &mut self.outputs)?;
+        for &(input, output) in &self.recurrent_states {
+            std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
+        }
+        let output = self.outputs.get(self.output).ok_or("it gives no output")?;
+        let output = parse_output(output).ok_or_else(|| format!("its output is not a picture: {:?}", output.shape))?;
+        match output.values.iter().all(|value| value.is_finite()) {
+            true => Ok(output),
+            false => Err("its output has a value that is not a number".to_owned()),
+        }
+    }
+
+    /// Sets the input picture for [`Self::run`].
+    pub fn set_picture(&mut self, color: &ColorImage) {
+        let (width, height) = self.size;
+        self.scale.set_sizes((color.width as usize, color.height as usize), self.size);
+        self.scaled.resize(3 * width, 0);
+        let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
+        let factor = self.scaling.divisor.map(f32::recip);
+        let values = &mut self.inputs[self.picture].values;
+        for y in 0..height {
+            self.scale.scale_row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
+            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, &self.scaled));
+            for (x, pixel) in self.scaled.as_chunks::<3>().0.iter().enumerate() {
+                for c in 0..3 {
+                    let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
+                    values[at] = (f32::from(pixel[order[c]]) - self.scaling.mean[c]) * factor[c];
+                }
+            }
+        }
+    }
+}
+
+/// Returns the channel axis of a picture port with one of these channel counts, 1 or 3; `None` if it is not a picture.
+fn channel_axis(port: &Port, channels: &[usize]) -> Option<usize> {
+    let &[batch, is_planar, _, last] = port.shape.as_slice() else { return None };
+    let has = |side: Option<usize>| side.is_some_and(|side| channels.contains(&side));
+    match () {
+        () if batch.is_some_and(|batch| batch != 1) => None,
+        () if has(is_planar) => Some(1),
+        () if has(last) => Some(3),
+        () => None,
+    }
+}
+
+/// Whether the port is a scalar, such as a downsampling ratio.
+fn is_ratio(port: &Port) -> bool {
+    port.shape.len() <= 1
+}
+
+/// Interprets a tensor as a picture of one or two channels, by its shape.
+fn parse_output(tensor: &Tensor) -> Option<NetworkOutput<'_>> {
+    let values = tensor.values.as_slice();
+    let (is_planar, channels, height, width) = match *tensor.shape.as_slice() {
+        [1, channels @ 1..=2, height, width] => (true, channels, height, width),
+        [1, height, width, channels @ 1..=2] => (false, channels, height, width),
+        [1, height, width] | [height, width] => (true, 1, height, width),
+        _ => return None,
+    };
+    let is_valid = width > 1 && height > 1 && width * height * channels == values.len();
+    is_valid.then_some(NetworkOutput { size: (width, height), channels, values, is_planar })
+}

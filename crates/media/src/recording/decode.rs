@@ -1,0 +1,327 @@
+//! Decodes PNG and JPEG files to pixels; the content decides the format.
+
+use std::path::Path;
+
+use image::metadata::Orientation;
+use pulp::{Arch, WithSimd};
+
+use super::coded::{self, EncodedPicture};
+use super::depth_covers;
+use super::fault::PictureFault;
+use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
+use super::samples::SampleFormat;
+use super::upright::upright;
+use bokehcam::color::{luminance, round_to_8bit};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+
+/// Working memory for decoding, kept from frame to frame.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// The content of a file that must be read completely: a JPEG or PFM, or a part of a recording's file.
+    pub(super) file: Vec<u8>,
+    /// One row of a PNG, or all pixels of a JPEG.
+    pub(super) pixels: Vec<u8>,
+    /// A right picture before its conversion to luma.
+    right: ColorImage,
+    /// Depth in the view of the depth camera, and in that of a colour camera without distortion.
+    pub(super) measured: DepthMap,
+    pub(super) drawn: DepthMap,
+}
+
+impl Scratch {
+    /// Reads the float map `path`.
+    pub(super) fn read_pfm(&mut self, path: &Path) -> Result<&[u8], PictureFault> {
+        coded::read_pfm(path, &mut self.file)
+    }
+}
+
+/// The encoding of depth in 16-bit pictures.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DepthUnits {
+    /// Units per metre, > 0.
+    pub(super) scale: f32,
+    /// Another value that means unknown, besides 0.
+    pub(super) invalid: Option<u16>,
+}
+
+/// The kind of a picture according to its header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PictureKind {
+    Color,
+    Depth,
+    Grey,
+}
+
+/// Reads width, height and kind of a picture from its header only.
+pub(super) fn read_header(path: &Path) -> Result<((u32, u32), PictureKind), PictureFault> {
+    let (size, samples) = coded::read_header(path)?;
+    let kind = match samples {
+        samples if samples.is_depth() => PictureKind::Depth,
+        samples if samples.has_color() => PictureKind::Color,
+        _ => PictureKind::Grey,
+    };
+    Ok((size, kind))
+}
+
+/// Decodes to 8-bit RGB: grey is repeated, transparency ignored, 16 bits are rounded to 8. With `expected`, a picture
+/// of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
+pub(super) fn read_color(
+    path: &Path,
+    expected: Option<(u32, u32)>,
+    scratch: &mut Scratch,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    match expected {
+        Some(expected) => decode_color_of_size(coded, expected, &mut scratch.pixels, into),
+        None => decode_color(coded, &mut scratch.pixels, into),
+    }
+}
+
+/// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag, which is then upright.
+pub(super) fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), PictureFault> {
+    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
+    let mut metadata = read_color(path, None, &mut scratch, &mut image)?;
+    drop(scratch);
+
+    let orientation = metadata.take_orientation();
+    Ok((upright(orientation).transform_color(image), metadata))
+}
+
+/// Decodes as [`decode_color`] does, but rejects a picture whose size is not `expected` before.
+pub(super) fn decode_color_of_size(
+    coded: EncodedPicture,
+    expected: (u32, u32),
+    pixels: &mut Vec<u8>,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
+    check_color_size(coded.size(), expected)?;
+    decode_color(coded, pixels, into)
+}
+
+/// Rejects a picture of another size than `expected`.
+pub(super) fn check_color_size(found: (u32, u32), expected: (u32, u32)) -> Result<(), PictureFault> {
+    if found == expected { Ok(()) } else { Err(PictureFault::Size { found, expected }) }
+}
+
+/// Rejects a depth map that does not cover a picture of `color` pixels.
+pub(super) fn check_depth_size(found: (u32, u32), color: (u32, u32)) -> Result<(), PictureFault> {
+    if depth_covers(found, color) { Ok(()) } else { Err(PictureFault::DepthSize { found, color }) }
+}
+
+/// Reads width and height of a picture from its header only.
+pub(super) fn read_size(path: &Path) -> Result<(u32, u32), PictureFault> {
+    coded::read_header(path).map(|(size, _)| size)
+}
+
+/// Reads width and height of a picture as it is turned upright by its orientation tag, from its header only.
+pub(super) fn read_upright_size(path: &Path) -> Result<(u32, u32), PictureFault> {
+    let size = read_size(path)?;
+    // Faults are reported by whatever decodes the picture.
+    let orientation = coded::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    Ok(upright(orientation).rotated_size(size))
+}
+
+/// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag; its size is then `expected`.
+pub(super) fn read_upright(
+    path: &Path,
+    expected: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut ColorImage,
+) -> Result<(), PictureFault> {
+    let orientation = coded::read_orientation(path).unwrap_or(Orientation::NoTransforms);
+    if orientation == Orientation::NoTransforms {
+        return read_color(path, Some(expected), scratch, into).map(drop);
+    }
+    let found = read_upright_size(path)?;
+    if found != expected {
+        return Err(PictureFault::Size { found, expected });
+    }
+    read_color(path, None, scratch, into)?;
+    *into = upright(orientation).transform_color(std::mem::take(into));
+    Ok(())
+}
+
+/// Decodes an opened picture as [`read_color`] does. `pixels` is working memory.
+pub(super) fn decode_color(
+    coded: EncodedPicture,
+    pixels: &mut Vec<u8>,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
+    let ((width, height), samples) = (coded.size(), coded.samples());
+    into.resize(width, height);
+    if samples == (SampleFormat { channels: 3, is_16bit: false }) {
+        return coded.decode_rgb(pixels, &mut into.rgb);
+    }
+    let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
+    let mut metadata = coded.decode_runs(pixels, |run, row| {
+        let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
+        for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
+            *rgb = channels.map(|channel| match samples.is_16bit {
+                true => round_to_8bit(sample_u16(pixel, channel)),
+                false => pixel[channel],
+            });
+        }
+    })?;
+    let lost = [(samples.has_alpha(), TRANSPARENCY), (samples.is_16bit, SIXTEEN_BITS)];
+    metadata.lost_properties.extend(lost.iter().filter(|(is_lost, _)| *is_lost).map(|(_, words)| words));
+    Ok(metadata)
+}
+
+/// Returns the 16-bit sample of a channel.
+pub(super) fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
+    u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])
+}
+
+/// Decodes a right picture to luma, from RGB as for the left one. A picture whose size differs from `left` is rejected
+/// before it is decoded.
+pub(super) fn read_right_luma(
+    path: &Path,
+    left: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut GrayImage,
+) -> Result<(), PictureFault> {
+    // Moved out, as `color` needs the rest of the scratch memory.
+    let mut right = std::mem::take(&mut scratch.right);
+    let decoded = read_color(path, Some(left), scratch, &mut right);
+    if decoded.is_ok() {
+        into.set_luma_from(&right);
+    }
+    scratch.right = right;
+    decoded.map(drop).map_err(|fault| match fault {
+        PictureFault::Size { found, expected: left } => PictureFault::EyeSize { found, left },
+        fault => fault,
+    })
+}
+
+/// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a picture is rejected.
+pub(super) fn read_depth(
+    path: &Path,
+    units: DepthUnits,
+    color_size: Option<(u32, u32)>,
+    scratch: &mut Scratch,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    decode_depth(coded, units, color_size, &mut scratch.pixels, into)
+}
+
+/// Decodes an opened picture as [`read_depth`] does. `pixels` is working memory.
+pub(super) fn decode_depth(
+    coded: EncodedPicture,
+    units: DepthUnits,
+    color_size: Option<(u32, u32)>,
+    pixels: &mut Vec<u8>,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
+    let samples = coded.samples();
+    if !samples.is_depth() {
+        return Err(match (samples.has_color(), samples.has_alpha()) {
+            (true, _) => PictureFault::NotDepth("a colour picture"),
+            (false, true) => PictureFault::NotDepth("grey with transparency"),
+            (false, false) => PictureFault::NotDepth("an 8-bit grey picture"),
+        });
+    }
+    let found = coded.size();
+    color_size.map_or(Ok(()), |color| check_depth_size(found, color))?;
+    into.resize(found.0, found.1);
+    let arch = Arch::new();
+    coded.decode_runs(pixels, |run, row| {
+        let (values, metres) = (row.as_chunks().0, &mut into.metres[run.first..]);
+        if run.step == 1 {
+            arch.dispatch(ConvertToMetres { values, units, metres });
+        } else {
+            let pixels = metres.iter_mut().step_by(run.step).zip(values);
+            pixels.for_each(|(metres, value)| *metres = units.to_metres(*value));
+        }
+    })?;
+    Ok(())
+}
+
+impl DepthUnits {
+    /// Converts a big-endian value to metres; 0 if it is unknown.
+    #[inline(always)]
+    pub(super) fn to_metres(self, value: [u8; 2]) -> f32 {
+        // 0 is unknown in any case.
+        let (value, invalid) = (u16::from_be_bytes(value), self.invalid.unwrap_or(0));
+        let depth_m = f32::from(value) / self.scale;
+        if (value != invalid) & DepthMap::is_known(depth_m) { depth_m } else { 0.0 }
+    }
+}
+
+/// Converts adjacent values to metres.
+struct ConvertToMetres<'a> {
+    values: &'a [[u8; 2]],
+    units: DepthUnits,
+    metres: &'a mut [f32],
+}
+
+impl WithSimd for ConvertToMetres<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { values, units, metres } = self;
+        for (metres, &value) in metres.iter_mut().zip(values) {
+            *metres = units.to_metres(value);
+        }
+    }
+}
+
+/// Decodes relative inverse depth (8 or 16 bits, grey, or RGB with grey content) to distances relative to the nearest
+/// one. A map that does not cover a picture of `color` pixels is rejected.
+pub(super) fn read_inverse_depth(
+    path: &Path,
+    white_is_far: bool,
+    color: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    let found = coded.size();
+    check_depth_size(found, color)?;
+    into.resize(found.0, found.1);
+    decode_grey(coded, &mut scratch.pixels, &mut into.metres)?;
+    for value in &mut into.metres {
+        *value = DepthMap::relative_to_metres(if white_is_far { 1.0 - *value } else { *value });
+    }
+    Ok(())
+}
+
+/// Decodes to width, height and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
+/// by alpha if there is one.
+pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
+    let mut scratch = Scratch::default();
+    let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    let (width, height) = coded.size();
+    let mut grey = vec![0.0; width as usize * height as usize];
+    decode_grey(coded, &mut scratch.pixels, &mut grey)?;
+    Ok((width, height, grey))
+}
+
+fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
+    decode_luma(coded, pixels, |at, luma, alpha| grey[at] = luma * alpha).map(drop)
+}
+
+/// Decodes an opened picture, and calls `on_pixel` with the place of each pixel, its luma and its alpha, 0 to 1 as stored
+/// (1 without alpha). `pixels` is working memory.
+pub(super) fn decode_luma(
+    coded: EncodedPicture,
+    pixels: &mut Vec<u8>,
+    mut on_pixel: impl FnMut(usize, f32, f32),
+) -> Result<PhotoMetadata, PictureFault> {
+    let samples = coded.samples();
+    coded.decode_runs(pixels, |run, row| {
+        let places = (run.first..).step_by(run.step);
+        for (at, pixel) in places.zip(row.chunks_exact(samples.bytes_per_pixel())) {
+            let sample = |channel: usize| match samples.is_16bit {
+                true => f32::from(sample_u16(pixel, channel)) / 65535.0,
+                false => f32::from(pixel[channel]) / 255.0,
+            };
+            let luma = match samples.has_color() {
+                true => luminance(sample(0), sample(1), sample(2)),
+                false => sample(0),
+            };
+            on_pixel(at, luma, if samples.has_alpha() { sample(samples.channels - 1) } else { 1.0 });
+        }
+    })
+}

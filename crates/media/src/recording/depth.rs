@@ -1,0 +1,143 @@
+//! The depth of a recording, in the view of its colour camera.
+
+use std::mem;
+
+use image::metadata::Orientation;
+
+use super::contents::DepthFormat;
+use super::decode::{self, Scratch};
+use super::error::RecordingError;
+use super::fault::PictureFault;
+use super::upright::upright;
+use super::{Recording, coded, pfm};
+use bokehcam::calibration::registration::{Registration, RgbdCalibration};
+use bokehcam::frame::DepthMap;
+
+impl Recording {
+    /// Returns whether the frames have depth.
+    pub fn has_depth(&self) -> bool {
+        self.depth.is_some()
+    }
+
+    /// Returns whether its depth is only relative.
+    pub fn has_relative_depth(&self) -> bool {
+        matches!(self.depth, Some(DepthFormat::Inverse { .. }))
+    }
+
+    /// Returns whether its depth is in the units of [`Options::depth_scale`](super::Options::depth_scale), and not in
+    /// units that it states itself.
+    pub fn has_depth_in_units(&self) -> bool {
+        matches!(self.depth, Some(DepthFormat::Units(_)))
+    }
+
+    /// Returns the recording with its depth registered, if there are distances and a calibration: the depth camera looks
+    /// from another place than the colour camera. The recording's own calibration is not used if it does not fit.
+    ///
+    /// # Errors
+    /// A given calibration is invalid, or for pictures of another aspect.
+    pub(super) fn register_depth(
+        mut self,
+        calibration: Option<RgbdCalibration>,
+        is_given: bool,
+    ) -> Result<Self, RecordingError> {
+        let Some(calibration) = calibration.filter(|_| self.has_depth() && !self.has_relative_depth()) else {
+            return Ok(self);
+        };
+        match self.create_registration(calibration) {
+            Ok(registration) => self.depth_registration = Some(registration),
+            Err(what) if is_given => {
+                return Err(RecordingError::DepthCalibration { dir: self.folder.dir.clone(), what });
+            }
+            Err(what) => tracing::warn!(
+                "{}: depth is taken as if it had the view of the colour camera, because its calibration does not fit: \
+                 {what}; --depth-calibration replaces it",
+                self.folder.dir.display()
+            ),
+        }
+        Ok(self)
+    }
+
+    fn create_registration(&self, calibration: RgbdCalibration) -> Result<Registration, String> {
+        let color = calibration.color.scaled_to(self.size).map_err(|error| error.to_string())?;
+        let size = calibration.depth.size.unwrap_or_default();
+        // Maps may have been scaled down since.
+        let (mut scratch, mut first) = (Scratch::default(), DepthMap::default());
+        let size = match self.decode_depth(0, size, &mut scratch, &mut first) {
+            Ok(()) => first.size(),
+            Err(
+                RecordingError::Picture { fault: PictureFault::DepthSize { found, .. }, .. }
+                | RecordingError::Listed { fault: PictureFault::DepthSize { found, .. }, .. },
+            ) => return Err(PictureFault::CalibratedSize { found, calibrated: size }.to_string()),
+            // Told when it is read.
+            Err(_) => size,
+        };
+        Registration::new(RgbdCalibration { color, ..calibration }, size).map_err(|error| error.to_string())
+    }
+
+    /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
+    /// with at most as many pixels.
+    ///
+    /// # Errors
+    /// Same as for [`Recording::read_color`]; or the recording has no depth.
+    pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
+        let Some(registration) = &self.depth_registration else {
+            return self.decode_depth(index, self.size, scratch, into);
+        };
+        let mut measured = mem::take(&mut scratch.measured);
+        let read = self.decode_depth(index, registration.size(), scratch, &mut measured);
+        if read.is_ok() {
+            registration.register(&measured, &mut scratch.drawn, into);
+        }
+        scratch.measured = measured;
+        read
+    }
+
+    /// Reads the depth of frame `index` as it was recorded, of the view of pictures of `size`; of exactly this size if it
+    /// is to be registered.
+    fn decode_depth(
+        &self,
+        index: usize,
+        size: (u32, u32),
+        scratch: &mut Scratch,
+        into: &mut DepthMap,
+    ) -> Result<(), RecordingError> {
+        let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
+        let form = self.depth.as_ref().ok_or_else(no_depth)?;
+        let frame = self.frame(index)?;
+        // Without a depth map, the line of the colour picture is at fault.
+        let source = frame.depth.as_ref().unwrap_or(&frame.color);
+        let read = match &self.container {
+            Some(container) => container.read_depth(index, size, scratch, into),
+            None => {
+                let path = self.folder.locate(source)?;
+                // Maps of photos are turned as photos are.
+                let tag = self.are_photos.then(|| coded::read_orientation(&path).ok()).flatten();
+                let turn = upright(tag.unwrap_or(Orientation::NoTransforms));
+                let size = turn.rotated_size(size);
+                let read = match form {
+                    DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
+                        decode::read_depth(&path, *units, Some(size), scratch, into)
+                    }
+                    DepthFormat::Inverse { white_is_far } => {
+                        decode::read_inverse_depth(&path, *white_is_far, size, scratch, into)
+                    }
+                    DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, size, scratch, into),
+                };
+                if !turn.is_identity() {
+                    *into = turn.transform_map(mem::take(into), size);
+                }
+                read
+            }
+        };
+        let read = match (read, &self.depth_registration) {
+            (Ok(()), Some(_)) if into.size() != size => {
+                Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size })
+            }
+            (Err(PictureFault::DepthSize { found, .. }), Some(_)) => {
+                Err(PictureFault::CalibratedSize { found, calibrated: size })
+            }
+            (read, _) => read,
+        };
+        read.map_err(|fault| source.error(&self.folder.dir, fault))
+    }
+}

@@ -1,0 +1,185 @@
+//! Metadata of picture files that is copied to derived pictures.
+
+use image::ImageDecoder;
+use image::metadata::Orientation;
+
+use super::tiff_directory::TiffDirectories;
+use super::{icc, image_resources, xmp};
+use bokehcam::compute::catch_panic;
+use bokehcam::names;
+
+names::named! {
+    /// A file format for pictures, by the extension of its files.
+    pub enum PhotoFormat default Png {
+        /// Lossless
+        Png = "png",
+        /// Lossy, and smaller; 8 bits without alpha
+        Jpeg = "jpg",
+        /// Lossless
+        Tiff = "tif",
+        /// Lossless, and small; 8 bits
+        WebP = "webp",
+    }
+}
+
+/// Metadata of a picture, and what was lost on reading.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PhotoMetadata {
+    /// ICC profile of its RGB values; `None` is sRGB.
+    pub icc_profile: Option<Vec<u8>>,
+    /// EXIF data, beginning with the TIFF header.
+    pub exif: Option<Vec<u8>>,
+    /// XMP packet, with rights and authors.
+    pub xmp: Option<String>,
+    /// Photoshop's image resources without thumbnails, with captions and rights as IPTC.
+    pub image_resources: Option<Vec<u8>>,
+    /// What is lost on reading or writing, in words for a message.
+    pub lost_properties: Vec<&'static str>,
+}
+
+/// What 8-bit pictures without alpha lose, in words for a message.
+pub(super) const TRANSPARENCY: &str = "transparency";
+pub(super) const SIXTEEN_BITS: &str = "16 bits a channel";
+
+/// Maximum EXIF bytes in a JPEG: a segment has 65533, six of which are its identifier.
+const MAX_JPEG_EXIF_BYTES: usize = 65_533 - 6;
+/// Maximum profile bytes in a JPEG: 255 segments, less 14 bytes of numbering each.
+const MAX_JPEG_ICC_BYTES: usize = 255 * (65_533 - 14);
+
+impl PhotoMetadata {
+    /// Reads the metadata of a PNG as stored, before its palette is expanded.
+    pub(super) fn from_png(info: &png::Info) -> Self {
+        let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
+        let mut metadata = Self { exif, ..Self::default() };
+        metadata.set_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
+        if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD) {
+            let mut chunk = chunk.clone();
+            // Limit decompression to a sensible size.
+            let packet = chunk.decompress_text_with_limit(xmp::MAX_BYTES).and_then(|()| chunk.get_text());
+            metadata.set_xmp(packet.map(String::into_bytes).map_err(|_| "XMP that is damaged"));
+        }
+        metadata
+    }
+
+    /// Reads the metadata of a picture before it is decoded.
+    pub(super) fn from_decoder(decoder: &mut dyn ImageDecoder) -> Self {
+        // Unreadable metadata must not reject the picture.
+        let exif = decoder.exif_metadata().ok().flatten();
+        // A TIFF states its orientation by itself.
+        let orientation = decoder.orientation().ok().filter(|turned| *turned != Orientation::NoTransforms);
+        let exif = exif.or_else(|| orientation.map(exif_of_orientation));
+        let mut metadata = Self { exif, ..Self::default() };
+        metadata.set_profile(decoder.icc_profile().ok().flatten());
+        if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
+            metadata.set_xmp(Ok(packet));
+        }
+        if let Some(resources) = decoder.iptc_metadata().ok().flatten() {
+            match image_resources::keep_valid_parts(&resources) {
+                Some(kept) => metadata.image_resources = Some(kept).filter(|kept| !kept.is_empty()),
+                None => metadata.lost_properties.push("captions (IPTC) that are damaged"),
+            }
+        }
+        metadata
+    }
+
+    /// Keeps a profile only if it is for RGB: the pixels become RGB, so a grey or CMYK profile no longer applies.
+    fn set_profile(&mut self, profile: Option<Vec<u8>>) {
+        match profile {
+            Some(profile) if !icc::is_rgb(&profile) => {
+                self.lost_properties.push("a colour profile that is not of RGB (the blur uses sRGB's tone curve)");
+            }
+            profile => self.icc_profile = profile,
+        }
+    }
+
+    /// Keeps the parts of a packet that are still valid.
+    fn set_xmp(&mut self, packet: Result<Vec<u8>, &'static str>) {
+        match packet.and_then(xmp::keep_valid_parts) {
+            Ok(xmp::ValidParts { packet, lost }) => {
+                self.xmp = Some(packet);
+                self.lost_properties.extend(lost);
+            }
+            Err(lost) => self.lost_properties.push(lost),
+        }
+    }
+
+    /// Returns the orientation and removes it from the EXIF: the caller rotates the pixels.
+    pub(super) fn take_orientation(&mut self) -> Orientation {
+        let remove = |exif| catch_panic(|| Orientation::remove_from_exif_chunk(exif)).flatten();
+        self.exif.as_deref_mut().and_then(remove).unwrap_or(Orientation::NoTransforms)
+    }
+
+    /// Removes the EXIF thumbnail, which would still show the original picture.
+    #[must_use]
+    pub fn without_thumbnail(mut self) -> Self {
+        if let Some(exif) = &mut self.exif {
+            // Damaged EXIF may hide a thumbnail: drop all of it.
+            if remove_thumbnail(exif).is_none() {
+                self.exif = None;
+                self.lost_properties.push("EXIF that is damaged");
+            }
+        }
+        self
+    }
+
+    /// Drops metadata that a format does not hold.
+    #[must_use]
+    pub fn for_format(mut self, format: PhotoFormat) -> Self {
+        match format {
+            PhotoFormat::Jpeg => return self.for_jpeg(),
+            PhotoFormat::Tiff => {}
+            PhotoFormat::Png | PhotoFormat::WebP => {
+                let resources = self.image_resources.take();
+                let has_iptc = resources.as_deref().is_some_and(image_resources::have_iptc);
+                self.lost_properties.extend(has_iptc.then_some("captions and rights as IPTC"));
+            }
+        }
+        self
+    }
+
+    /// Drops metadata that is too large for a JPEG.
+    #[must_use]
+    pub fn for_jpeg(mut self) -> Self {
+        if self.exif.as_ref().is_some_and(|exif| exif.len() > MAX_JPEG_EXIF_BYTES) {
+            self.exif = None;
+            self.lost_properties.push("EXIF larger than a JPEG holds");
+        }
+        if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MAX_JPEG_ICC_BYTES) {
+            self.icc_profile = None;
+            self.lost_properties.push("a colour profile larger than a JPEG holds");
+        }
+        if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MAX_JPEG_BYTES) {
+            self.xmp = None;
+            self.lost_properties.push("XMP larger than a JPEG holds");
+        }
+        self
+    }
+}
+
+/// Returns EXIF with the orientation only.
+fn exif_of_orientation(orientation: Orientation) -> Vec<u8> {
+    // One entry: the tag 0x112 with one 16-bit number.
+    let entry = [0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation.to_exif(), 0, 0];
+    [&b"MM\0*\0\0\0\x08\0\x01"[..], &entry, &[0; 4]].concat()
+}
+
+/// Unlinks the thumbnail's directory (IFD1) from the chain of EXIF directories, and overwrites the thumbnail with
+/// zeros. Returns `None` if an offset points outside, or the directory is cut.
+///
+/// A directory is a count (2 bytes), entries of 12 bytes (tag first, value at byte 8), and the offset of the next one.
+fn remove_thumbnail(exif: &mut [u8]) -> Option<()> {
+    const THUMBNAIL_OFFSET: u16 = 0x0201;
+    const THUMBNAIL_LENGTH: u16 = 0x0202;
+    let file = TiffDirectories::parse(exif)?;
+    let first = file.u32_at(4)?;
+    let next_link = first + 2 + 12 * usize::from(file.u16_at(first)?);
+    // A single directory may lack the offset of the next one.
+    let Some(second) = file.u32_at(next_link).filter(|&second| second != 0) else { return Some(()) };
+    exif.get(second + 2..second + 2 + 12 * usize::from(file.u16_at(second)?))?;
+    let value = |tag| file.u32_at(file.find_tag(second, tag)? + 8);
+    if let Some((offset, length)) = value(THUMBNAIL_OFFSET).zip(value(THUMBNAIL_LENGTH)) {
+        exif.get_mut(offset..offset.checked_add(length)?)?.fill(0);
+    }
+    exif[next_link..next_link + 4].fill(0);
+    Some(())
+}
