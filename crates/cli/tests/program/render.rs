@@ -232,10 +232,13 @@ fn pictures_in_the_wrong_place_are_said() {
         ("--mask", "white.png", "1.0 all over"),
         ("--mask", "black.png", "0.0 all over"),
         ("--mask", "grey.png", "0.5 all over"),
+        ("--mask", "in.png", "the picture itself"),
         ("--depth-map", "mm.png", "add --depth-scale 1000"),
     ] {
         warned(&home, &["render"], &["in.png", option, file, "--refine", "off", "--out", "out.png"], expected);
     }
+    let inverse = ["in.png", "--depth-map", "in.png", "--depth-unit", "inverse", "--refine", "off", "--out", "out.png"];
+    warned(&home, &["render"], &inverse, "the picture itself");
     for (map, expected) in [("unknown.png", "no depth is known"), ("flat.png", "one value"), ("grey.png", "8-bit")] {
         run(&home, &["in.png", "--depth-map", map, "--out", "no.png"]).failed(1, &[map, expected]);
     }

@@ -1,6 +1,6 @@
 //! Input of `render`: the picture, and its depth, which is given, computed, or found in the photo.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::RenderCommand;
@@ -15,6 +15,7 @@ use bokehcam::look::{Look, Refine};
 use bokehcam_live::source::orientation::transform_photo;
 use bokehcam_live::source::photo::{self, PhotoDepth};
 use bokehcam_live::source::{self, DepthChoice, DepthOrigin, PlateFile};
+use bokehcam_media::files::place;
 use bokehcam_media::recording::depth_file::DepthFile;
 use bokehcam_media::recording::mask_file::{self, MaskFile};
 use bokehcam_media::recording::{Photo, snapshot};
@@ -58,6 +59,13 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
     }
     let mut photo = Photo::read(&image)?;
     photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
+    let is_itself = |file: &&PathBuf| place::resolve_links(file) == place::resolve_links(&image);
+    // A cut-out is its own mask.
+    if let Some(file) = command.depth_map.as_ref().or(command.mask.as_ref()).filter(is_itself)
+        && photo.alpha.is_none()
+    {
+        log::warn(&format!("{}: this is the picture itself, not its depth or mask", file.display()));
+    }
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
     let own_px = photo.color.size();
     transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;
