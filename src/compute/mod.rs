@@ -116,7 +116,7 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
     done.map_err(std::mem::forget).ok()
 }
 
-/// Declares that whoever runs work on this thread reports its panics, as [`catch_panic`] does.
+/// Declares that the caller of the work on this thread reports its panics, as [`catch_panic`] does.
 pub fn expect_panics() {
     IS_CATCHING.set(true);
 }

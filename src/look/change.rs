@@ -78,7 +78,7 @@ impl Change {
 }
 
 impl Patch {
-    /// Returns the settings in metres. In `relative` depth, a focus from 0 to 1 is none: it is a place.
+    /// Returns the settings in metres. In `relative` depth, a focus from 0 to 1 is a place, and not a distance.
     pub fn metric_settings(&self, relative: bool) -> Vec<Value> {
         let is_distance = |focus: FocusRule| match relative {
             true => focus.for_depth(true).is_none(),

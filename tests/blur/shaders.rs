@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use std::mem::offset_of;
+use std::path::{Path, PathBuf};
 
 use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Work};
 use bokehcam::bokeh::plan::MAX_BINS;
@@ -57,9 +58,12 @@ fn shared_booleans(module: &naga::Module) -> Vec<&str> {
 
 #[test]
 fn every_file_is_a_pass_or_shared_and_short() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
-    for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
-        let path = entry.expect("an entry").path();
+    let entries = |folder: PathBuf| {
+        let entries = std::fs::read_dir(folder).expect("a folder of shaders");
+        entries.map(|entry| entry.expect("an entry").path())
+    };
+    let folders = entries(Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
+    for path in folders.flat_map(entries) {
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
         let shared = "base cells common filter list meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo work \
              yuyv stereo_common stereo_line \

@@ -81,7 +81,7 @@ fn call<T: Send + 'static>(
     let thread = thread::Builder::new().name("network".to_owned()).stack_size(STACK_BYTES);
     let spawned = thread.spawn(move || {
         limit.apply();
-        // Nobody waits any longer if this fails.
+        // Fails if the caller has given up.
         let _ = done.send(catch_panic(work));
     });
     spawned.map_err(|error| format!("its thread does not start: {error}"))?;

@@ -173,7 +173,7 @@ fn warn_of_flat_mask(file: &Path, mask: &Mask) {
     }
 }
 
-/// Warns if nobody is in front of the plate, or found by networks.
+/// Warns if no person is in front of the plate, or found by networks.
 fn warn_of_nobody(plate: Option<&PlateFile>, map: &DepthMap) {
     let is_near = |subject_m: f32| map.metres.iter().any(|&metres| metres <= subject_m);
     match (map.subject_m, plate) {
