@@ -1,4 +1,4 @@
-// YUYV of BT.601 in limited range, bit-exact to src/sink/yuyv.rs.
+// YUYV of BT.601 in limited range, bit-exact to crates/live/src/sink/yuyv.rs.
 
 // Channels of packed sRGB: red in the lowest byte, then green and blue.
 fn unpack_rgb(codes: u32) -> vec3<i32> {

@@ -14,7 +14,8 @@ sizes=${SIZES:-1920x1080,3840x2160}
 frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
-    cargo test --release --locked --features gpu --test blur -- --include-ignored parity:: yuyv:: shared_frame::
+    cargo test --release --locked --features gpu --test blur -- --include-ignored parity:: shared_frame::
+    cargo test --release --locked --features gpu --test pipeline -- --include-ignored yuyv
     cargo test --release --locked --features gpu --test depth -- --include-ignored gpu:: stereo_tidying::
     # Depth from two eyes: each pass by the device's own timestamps, then whole pairs.
     for pair in 640x480x64 1280x720x128; do

@@ -29,9 +29,9 @@
 //!
 //! # Verification
 //! Each memory order has its reason beside it. The models in `models.rs` are run by loom in every order of the threads
-//! up to a number of preemptions; `crates/link/tests/handover.rs` counts a million frames, and the window's
-//! `tests/allocation` counts allocations. `scripts/prove-link` runs loom, and Miri and ThreadSanitizer where the
-//! toolchain has them.
+//! up to a number of preemptions; `crates/link/tests/handover.rs` counts a million frames, and
+//! `crates/window/tests/allocation` counts allocations. `scripts/prove-link` runs loom, and Miri and ThreadSanitizer where
+//! the toolchain has them.
 //! `cargo bench --bench handover` compares with a mutex and a condition variable.
 
 pub mod demand;

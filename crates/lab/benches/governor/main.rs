@@ -7,7 +7,7 @@
 //! | `play` | one run of one of them, and what is counted |
 //! | `claims` | the machines, and what is claimed of the governor on each |
 //!
-//! Exit code 1 if a claim is broken; `tests/governor.rs` checks all claims that need no rival.
+//! Exit code 1 if a claim is broken; `crates/lab/tests/lab/governor.rs` checks all claims that need no rival.
 
 mod claims;
 #[path = "../common/mod.rs"]

@@ -9,7 +9,7 @@
 //! | `metrics`, `flip`, `highlight` | how it is measured |
 //! | `report`, `markdown`, `sheet` | what comes out |
 //!
-//! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` tests the bench itself.
+//! Every method gets the same 8-bit picture and the same depth map. `crates/lab/tests/lab/quality.rs` tests the bench itself.
 
 mod builder;
 #[path = "../common/mod.rs"]
