@@ -15,7 +15,7 @@ use std::time::Duration;
 use crate::program::{Beside, PROGRAM, ROOT, in_session, until, without};
 
 /// Commands of other programs, and builds, that are skipped: a part of the command, and the reason.
-const LEFT_OUT: [(&str, &str); 19] = [
+const LEFT_OUT: [(&str, &str); 17] = [
     ("sudo ", "needs root"),
     ("systemctl ", "needs a session, and starts something in it"),
     ("journalctl ", "needs a session"),
@@ -29,8 +29,6 @@ const LEFT_OUT: [(&str, &str); 19] = [
     ("parallel --joblog", "needs GNU parallel"),
     ("sbatch ", "needs Slurm"),
     ("UNIX-CONNECT", "needs socat"),
-    ("gsettings", "needs GNOME"),
-    ("org.gnome", "needs GNOME"),
     ("gdbus ", "needs a session's message bus"),
     ("gnome-shell", "needs GNOME"),
     ("gnome-extensions", "needs GNOME"),
