@@ -38,6 +38,9 @@
 //! shaders without loop bounding in `compute/device.rs`, for the allocator in `compute/memory_limit.rs`, and in the crate
 //! `bokehcam-link`, where each block has its safety argument. `scripts/prove-link` checks it with loom, Miri and ThreadSanitizer.
 
+// What only the GPU needs is no reason for attributes of its own.
+#![cfg_attr(not(feature = "gpu"), allow(dead_code, unused_imports))]
+
 #[doc(hidden)]
 pub use bokehcam_link as link;
 

@@ -13,8 +13,8 @@ pub mod cpu;
 mod error;
 #[doc(hidden)]
 pub mod fallback;
-#[cfg(feature = "gpu")]
 #[doc(hidden)]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 #[doc(hidden)]
 pub mod ladder;
@@ -190,26 +190,10 @@ pub fn create_blur(
 ) -> Result<Box<dyn Bokeh>, BokehError> {
     settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
-    #[cfg(feature = "gpu")]
-    if let Some(device) = device {
-        return create_gpu_with_fallback(&plan, device, threads);
-    }
-    #[cfg(not(feature = "gpu"))]
-    let _ = device;
-    Ok(Box::new(cpu::BandedBokeh::new(plan, threads)))
-}
-
-/// Creates a GPU executor after checking its results against the CPU's. The fallback to the CPU allocates its buffers
-/// only when the GPU fails.
-#[cfg(feature = "gpu")]
-fn create_gpu_with_fallback(
-    plan: &plan::Plan,
-    device: Arc<Device>,
-    threads: Option<usize>,
-) -> Result<Box<dyn Bokeh>, BokehError> {
+    let Some(device) = device else { return Ok(Box::new(cpu::BandedBokeh::new(plan, threads))) };
     gpu::run_self_test(&device)?;
-    let gpu = gpu::GpuBokeh::with_device(plan, device)?;
-    let plan = plan.clone();
+    let gpu = gpu::GpuBokeh::with_device(&plan, device)?;
+    // Allocates its buffers only when the GPU fails.
     let cpu = move || -> Box<dyn Bokeh> { Box::new(cpu::BandedBokeh::new(plan, threads)) };
     Ok(Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu))))
 }

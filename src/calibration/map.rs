@@ -68,7 +68,6 @@ impl RemapTable {
     }
 
     /// Returns for each pixel the index of the upper left one of its four sources, and both fractions, for the GPU.
-    #[cfg(feature = "gpu")]
     pub(crate) fn packed_words(&self) -> [&[u32]; 2] {
         [&self.starts, &self.fractions]
     }

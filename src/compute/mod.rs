@@ -2,7 +2,7 @@
 
 pub mod aligned;
 pub mod bands;
-#[cfg(feature = "gpu")]
+#[cfg_attr(not(feature = "gpu"), path = "no_device.rs")]
 pub mod device;
 pub mod memory;
 pub mod memory_limit;
@@ -17,24 +17,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::names::named;
 
-#[cfg(feature = "gpu")]
 pub use device::{Device, DeviceFrame, DevicePicture};
 pub use pass_times::PassTimes;
-
-/// Uninhabited GPU type of builds without GPU support.
-#[cfg(not(feature = "gpu"))]
-#[derive(Debug)]
-pub enum Device {}
-
-/// Uninhabited GPU picture of builds without GPU support.
-#[cfg(not(feature = "gpu"))]
-#[derive(Debug)]
-pub enum DevicePicture {}
-
-/// Uninhabited GPU frame of builds without GPU support.
-#[cfg(not(feature = "gpu"))]
-#[derive(Debug)]
-pub enum DeviceFrame {}
 
 named! {
     /// Where the executors run. A software Vulkan driver is far slower than plain code, so it has to be asked for.
@@ -71,34 +55,6 @@ pub enum GpuError {
     /// The GPU refused or was lost.
     #[error("GPU: {0}")]
     Failed(String),
-}
-
-#[cfg(not(feature = "gpu"))]
-impl GpuError {
-    /// Returns the error of a build without GPU support.
-    pub fn without_gpu_support() -> Self {
-        let wanted = "at all: this program was built without GPU support (feature `gpu`)".to_owned();
-        Self::NoAdapter { wanted, found: "none".to_owned() }
-    }
-}
-
-#[cfg(not(feature = "gpu"))]
-impl Device {
-    /// Always fails.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn open(_: bool, _: Option<&str>) -> Result<Self, GpuError> {
-        Err(GpuError::without_gpu_support())
-    }
-
-    /// Never called: there is no value of this type.
-    ///
-    /// # Errors
-    /// Never.
-    pub fn check(&self) -> Result<(), GpuError> {
-        match *self {}
-    }
 }
 
 thread_local! {

@@ -1,11 +1,9 @@
 //! GPU with CPU fallback: a worker runs on a device until its first fault, and on the CPU from then on.
 
 use std::fmt::Display;
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
 use super::GpuError;
-#[cfg(feature = "gpu")]
 use super::device::{Device, SelfTest};
 
 /// A worker on a device, and the data to replace it. The first fault is logged and handled by the fallback; later ones
@@ -97,7 +95,6 @@ impl<T> WithFallback<Option<T>> {
     }
 }
 
-#[cfg(feature = "gpu")]
 impl<T: 'static> WithFallback<Option<T>> {
     /// Creates the worker with `make` on a device, if there is one and it passes the `self_test`. The self-test runs
     /// once per device, and logs its fault. There is no worker on a device that has failed, which was reported already.

@@ -18,7 +18,6 @@ impl Tap {
     }
 
     /// Returns the nearer sample.
-    #[cfg(feature = "gpu")]
     pub fn nearest(self) -> usize {
         if self.weight >= 0.5 { self.second } else { self.first }
     }

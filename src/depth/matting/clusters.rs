@@ -12,10 +12,8 @@ use super::linear_light;
 use super::symmetric::{Symmetric, outer_product};
 use crate::depth::bitmap::Bitmap;
 
-#[cfg(feature = "gpu")]
 pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
 pub(super) use color_models::Clusters;
-#[cfg(feature = "gpu")]
 pub(super) use color_models::{FALLOFF_PX, FRINGE_PIXELS, RADII_CELLS};
 
 /// Side of a cell, in pixels.

@@ -9,8 +9,8 @@ mod alpha;
 mod clusters;
 mod contrast;
 mod edges;
-#[cfg(feature = "gpu")]
 #[doc(hidden)]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod known_background;
 pub mod mask;
@@ -26,7 +26,6 @@ use pulp::Arch;
 use crate::color::srgb_to_linear_table;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
-#[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
@@ -74,7 +73,6 @@ pub struct Matting {
     /// Whether the warning about too many edges was logged.
     is_noise_logged: bool,
     /// The GPU implementation, used until the device fails.
-    #[cfg(feature = "gpu")]
     gpu: WithFallback<Option<gpu::GpuMatting>>,
 }
 
@@ -153,7 +151,6 @@ impl Default for Matting {
             traced: Vec::new(),
             device_frame: None,
             is_noise_logged: false,
-            #[cfg(feature = "gpu")]
             gpu: WithFallback::default(),
         }
     }
@@ -164,18 +161,8 @@ impl Matting {
     /// later, the CPU takes over from that frame on.
     #[must_use]
     pub fn with_device(self, device: Option<&Arc<Device>>) -> Self {
-        #[cfg(feature = "gpu")]
-        {
-            Self {
-                gpu: WithFallback::create_tested(device, "finds mattes", gpu::run_self_test, gpu::GpuMatting::new),
-                ..self
-            }
-        }
-        #[cfg(not(feature = "gpu"))]
-        {
-            let _ = device;
-            self
-        }
+        let gpu = WithFallback::create_tested(device, "finds mattes", gpu::run_self_test, gpu::GpuMatting::new);
+        Self { gpu, ..self }
     }
 
     /// Sets the GPU buffers that already contain the map and the picture of the next call.
@@ -185,10 +172,7 @@ impl Matting {
 
     /// Returns the backends used, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
-        #[cfg(feature = "gpu")]
-        return self.gpu.backends();
-        #[cfg(not(feature = "gpu"))]
-        "cpu"
+        self.gpu.backends()
     }
 
     /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
@@ -212,8 +196,6 @@ impl Matting {
         if map.size() != color.size() || map.metres.is_empty() || !depth_step.is_finite() {
             return;
         }
-        #[cfg(not(feature = "gpu"))]
-        let _ = device_frame;
         let most = Matte::max_pixels(map.width as usize, map.height as usize);
         let least_step = depth_step;
         let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
@@ -225,7 +207,6 @@ impl Matting {
                 );
             }
         };
-        #[cfg(feature = "gpu")]
         if self.gpu.try_run("finds mattes", |gpu| {
             for depth_step in depth_steps() {
                 if gpu.find_mixed_pixels((map, color), device_frame.clone(), depth_step, background)? <= most {

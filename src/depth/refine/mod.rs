@@ -9,8 +9,8 @@
 mod align;
 mod band;
 mod exactness;
-#[cfg(feature = "gpu")]
 #[doc(hidden)]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod noise;
 mod outlines;
@@ -35,7 +35,6 @@ use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::HoleFiller;
 use crate::compute::thread_pool::ThreadPool;
-#[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Letterbox;
@@ -92,7 +91,6 @@ pub struct Refiner {
     /// Whether no frame follows another, so that nothing is kept of them.
     single: bool,
     /// Refines instead of the CPU, until the device fails.
-    #[cfg(feature = "gpu")]
     gpu: WithFallback<Option<gpu::GpuRefiner>>,
 }
 
@@ -128,44 +126,25 @@ impl Refiner {
     /// takes over with the same frame.
     #[must_use]
     pub fn with_device(self, device: Option<&Arc<Device>>) -> Self {
-        #[cfg(feature = "gpu")]
-        {
-            let device = device.filter(|_| self.correction == MapCorrection::default());
-            Self {
-                gpu: WithFallback::create_tested(device, "refines", gpu::run_self_test, gpu::GpuRefiner::new),
-                ..self
-            }
-        }
-        #[cfg(not(feature = "gpu"))]
-        {
-            let _ = device;
-            self
-        }
+        let device = device.filter(|_| self.correction == MapCorrection::default());
+        let gpu = WithFallback::create_tested(device, "refines", gpu::run_self_test, gpu::GpuRefiner::new);
+        Self { gpu, ..self }
     }
 
     /// Returns the backends used, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
-        #[cfg(feature = "gpu")]
-        return self.gpu.backends();
-        #[cfg(not(feature = "gpu"))]
-        "cpu"
+        self.gpu.backends()
     }
 
     /// Returns the last refined map and its picture on the device; `None` if the CPU refined it. Valid until the next
     /// frame.
     pub fn device_frame(&self) -> Option<DeviceFrame> {
-        #[cfg(feature = "gpu")]
-        return self.gpu.worker().as_ref()?.device_frame();
-        #[cfg(not(feature = "gpu"))]
-        None
+        self.gpu.worker().as_ref()?.device_frame()
     }
 
     /// Returns a copy of the last refined map and its picture on the device, once per frame.
     pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
-        #[cfg(feature = "gpu")]
-        return self.gpu.worker_mut().as_mut()?.take_copy();
-        #[cfg(not(feature = "gpu"))]
-        None
+        self.gpu.worker_mut().as_mut()?.take_copy()
     }
 
     /// Discards the state of earlier frames, for a new scene.
@@ -173,7 +152,6 @@ impl Refiner {
         self.filler = HoleFiller::new();
         self.temporal.reset();
         self.focus = Focus::default();
-        #[cfg(feature = "gpu")]
         self.gpu.worker_mut().iter_mut().for_each(gpu::GpuRefiner::reset);
     }
 
@@ -201,7 +179,6 @@ impl Refiner {
         color: &ColorImage,
         time_ns: u64,
     ) {
-        #[cfg(feature = "gpu")]
         if self.gpu.try_run("refines", |gpu| gpu.refine(map, color, time_ns, self.focus.0)) {
             return;
         }

@@ -1,17 +1,12 @@
 //! Selects the executor: one on a GPU, one on the CPU, or the CPU's when the GPU fails.
 
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
 use super::cpu::CpuExecutor;
 use super::executor::Executor;
-#[cfg(feature = "gpu")]
 use super::gpu::GpuExecutor;
-#[cfg(feature = "gpu")]
 use crate::compute::device::Device;
-#[cfg(feature = "gpu")]
 use crate::compute::thread_pool::ThreadPool;
-#[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
 use crate::compute::{Backend, GpuError};
 
@@ -19,7 +14,6 @@ use crate::compute::{Backend, GpuError};
 pub(super) struct Executors {
     threads: usize,
     /// The GPU, if one is used, and whether it was requested by name or kind, so that the CPU must not replace it.
-    #[cfg(feature = "gpu")]
     gpu: Option<(Arc<Device>, bool)>,
 }
 
@@ -28,7 +22,6 @@ impl Executors {
     ///
     /// # Errors
     /// Fails if a GPU is required and none fits.
-    #[cfg(feature = "gpu")]
     pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
         if backend == Backend::Cpu {
             return Ok(Self { threads, gpu: None });
@@ -44,19 +37,6 @@ impl Executors {
         }
     }
 
-    /// Selects the CPU, for a pool of `threads`.
-    ///
-    /// # Errors
-    /// Fails if a GPU is required.
-    #[cfg(not(feature = "gpu"))]
-    pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
-        if backend == Backend::Gpu || adapter.is_some() {
-            Err(GpuError::without_gpu_support())
-        } else {
-            Ok(Self { threads })
-        }
-    }
-
     /// Creates an executor for pictures of `size` (columns, rows) and at least `disparities` candidates, at most 256,
     /// that removes speckles of up to `max_speckle` pixels.
     ///
@@ -68,7 +48,6 @@ impl Executors {
         disparities: usize,
         max_speckle: u32,
     ) -> Result<Box<dyn Executor>, GpuError> {
-        #[cfg(feature = "gpu")]
         if let Some((device, is_required)) = &self.gpu {
             match GpuExecutor::new(device, size, disparities, max_speckle) {
                 Ok(gpu) => {
@@ -86,10 +65,8 @@ impl Executors {
 }
 
 /// Creates the executor on the CPU.
-#[cfg(feature = "gpu")]
 type MakeCpu = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
 
-#[cfg(feature = "gpu")]
 impl Executor for WithFallback<Box<dyn Executor>, MakeCpu> {
     fn describe(&self) -> String {
         self.worker().describe()

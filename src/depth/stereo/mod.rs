@@ -14,8 +14,8 @@ mod executors;
 mod fattening;
 pub mod fixed;
 mod gaps;
-#[cfg(feature = "gpu")]
 #[doc(hidden)]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod half;
 mod penalty;

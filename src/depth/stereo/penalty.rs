@@ -19,7 +19,6 @@ impl Penalties {
     }
 
     /// Returns the table, indexed by the difference.
-    #[cfg(feature = "gpu")]
     pub fn table(&self) -> &[u8; 256] {
         &self.0
     }

@@ -1,36 +1,26 @@
 //! Rectifies pairs on the device that matches them: on a GPU, or on the CPU, which takes over when the GPU fails.
 
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
-#[cfg(feature = "gpu")]
 use super::gpu::rectifier::GpuRectifier;
 use crate::calibration::rectifier::Rectifier;
-#[cfg(feature = "gpu")]
 use crate::compute::Device;
-#[cfg(feature = "gpu")]
 use crate::compute::with_fallback::WithFallback;
 use crate::frame::{ColorImage, GrayImage};
 
 /// Rectifies both pictures of a pair; CPU and GPU agree to the bit.
 pub(super) struct PairRectifier {
     rectifier: Rectifier,
-    #[cfg(feature = "gpu")]
     gpu: WithFallback<Option<GpuRectifier>>,
 }
 
 impl PairRectifier {
     /// Creates a rectifier on the CPU.
     pub fn new(rectifier: Rectifier) -> Self {
-        Self {
-            rectifier,
-            #[cfg(feature = "gpu")]
-            gpu: WithFallback::default(),
-        }
+        Self { rectifier, gpu: WithFallback::default() }
     }
 
     /// Moves the rectification to `device` if its results are exact; otherwise logs why it stays on the CPU.
-    #[cfg(feature = "gpu")]
     pub fn with_device(self, device: Option<Arc<Device>>) -> Self {
         let gpu = device.and_then(|device| match GpuRectifier::new(&device, self.rectifier.maps()) {
             Ok(gpu) => Some(gpu),
@@ -44,7 +34,6 @@ impl PairRectifier {
 
     /// Rectifies the left picture into `into`.
     pub fn rectify_left(&mut self, from: &ColorImage, into: &mut ColorImage) {
-        #[cfg(feature = "gpu")]
         if self.gpu.try_run("rectifies", |gpu| gpu.rectify_left(from, into)) {
             return;
         }
@@ -53,7 +42,6 @@ impl PairRectifier {
 
     /// Rectifies the right picture into `into`.
     pub fn rectify_right(&mut self, from: &GrayImage, into: &mut GrayImage) {
-        #[cfg(feature = "gpu")]
         if self.gpu.try_run("rectifies", |gpu| gpu.rectify_right(from, into)) {
             return;
         }

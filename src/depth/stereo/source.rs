@@ -70,9 +70,7 @@ impl StereoDepth {
     /// has one.
     pub fn from_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
-        let rectifier = PairRectifier::new(rectifier);
-        #[cfg(feature = "gpu")]
-        let rectifier = rectifier.with_device(matcher.device());
+        let rectifier = PairRectifier::new(rectifier).with_device(matcher.device());
         Self { rectifier: Some(rectifier), ..Self::from_rectified(source_name, rig, matcher, disparities) }
     }
 
