@@ -1,5 +1,6 @@
 //! Errors between the arguments and the pipeline.
 
+use std::error::Error;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -37,7 +38,6 @@ pub enum CliError {
     Exists(PathBuf),
     /// The output exists, and the command has no way to overwrite.
     #[error("{} exists, and stays as it is: choose another name", .0.display())]
-    #[cfg(feature = "camera")]
     NeverReplaced(PathBuf),
     /// A file or folder cannot be read or written.
     #[error("{}: {}", path.display(), input::format_io_error(source))]
@@ -53,17 +53,11 @@ pub enum CliError {
         /// The file with the report.
         kept: PathBuf,
     },
-    /// There is no window, or it failed.
-    #[error(transparent)]
-    #[cfg(feature = "window")]
-    Window(#[from] bokehcam_window::window::WindowError),
     /// A preview ended before its first frame.
     #[error("{0}")]
-    #[cfg(feature = "window")]
     NoFrames(String),
     /// An output of a preview failed.
     #[error("{0}")]
-    #[cfg(feature = "window")]
     OutputFailed(String),
     /// The snapshot has its settings, but not the picture that it was made from.
     #[error(
@@ -95,23 +89,18 @@ pub enum CliError {
     Signals(String),
     /// This program was built without cameras.
     #[error("this bokehcam was built without cameras: build it with the feature camera")]
-    #[cfg(not(feature = "camera"))]
     NoCameras,
-    /// The name matches no device.
+    /// There is no window, or it failed; or a name matches no device.
     #[error(transparent)]
-    #[cfg(feature = "camera")]
-    Node(#[from] bokehcam_live::v4l2::node::NodeError),
+    Part(Box<dyn Error + Send + Sync>),
     /// The file is not a video device.
     #[error("{}: this is not a video device", .0.display())]
-    #[cfg(feature = "camera")]
     NotVideo(PathBuf),
     /// The name matches no PipeWire camera.
     #[error("there is no camera '{0}' in PipeWire; `bokehcam devices` lists the cameras")]
-    #[cfg(feature = "camera")]
     NoPipeWireCamera(String),
     /// `doctor` found essential parts missing.
     #[error("there is no {0}: see above for what to do")]
-    #[cfg(feature = "camera")]
     NotReady(String),
     /// A picture or a recording cannot be read or written.
     #[error(transparent)]
@@ -184,7 +173,7 @@ impl CliError {
 
     /// Whether the reader of the output closed it, as in `... | head`, which is no failure.
     pub fn is_broken_pipe(&self) -> bool {
-        let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
+        let mut cause: Option<&(dyn Error + 'static)> = Some(self);
         while let Some(error) = cause {
             if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe) {
                 return true;

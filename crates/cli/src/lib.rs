@@ -1,6 +1,8 @@
 //! The command line: parses arguments and settings; one module per command.
 
 #![allow(missing_docs)]
+// What only a feature needs is no reason for attributes of its own.
+#![cfg_attr(not(feature = "packaged"), allow(dead_code, unused_imports))]
 
 mod commands;
 mod controlled;

@@ -43,5 +43,4 @@ pub fn parse_settings(path: &Path, text: &str) -> Result<(), CliError> {
     Ok(())
 }
 
-#[cfg(feature = "camera")]
 pub use bokehcam_live::source::registration::parse_calibration as depth_calibration;

@@ -49,7 +49,6 @@ pub fn stop_flag_between(items: &'static str) -> Result<Arc<AtomicBool>, CliErro
         // A hanging network must not delay the end.
         #[cfg(feature = "networks")]
         bokehcam_media::network::shorten_timeouts();
-        #[cfg(feature = "gpu")]
         bokehcam::compute::device::begin_shutdown();
         print_to_stderr(&format!("stopping after the current {items}; press Ctrl-C again to abort"));
     };
@@ -87,7 +86,6 @@ impl Progress {
     }
 
     /// Creates a bar that shows nothing.
-    #[cfg(feature = "camera")]
     pub fn silent() -> Self {
         Self(None)
     }

@@ -20,6 +20,9 @@
 //! `unsafe` is allowed in `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`, and under `v4l2`, where each
 //! block has its safety argument.
 
+// What only a feature needs is no reason for attributes of its own.
+#![cfg_attr(not(all(feature = "networks", feature = "pipewire")), allow(dead_code, unused_imports))]
+
 pub mod camera_control;
 pub mod capture;
 #[doc(hidden)]

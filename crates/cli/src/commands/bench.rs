@@ -1,5 +1,6 @@
 //! `bench`: measures the blur on this machine.
 
+#[cfg_attr(not(feature = "lab"), path = "bench/demo_picture.rs")]
 mod picture;
 
 use std::collections::BTreeMap;
@@ -159,7 +160,6 @@ pub fn run(command: &BenchCommand, global: &options::Global, given: &GivenSettin
 }
 
 /// Returns the table of one size at the default quality for `--backend auto` and for the CPU; takes some seconds.
-#[cfg(feature = "camera")]
 pub fn run_short_benchmark() -> String {
     const SIZE: (u32, u32) = (1280, 720);
     let frame = match picture::render_first_frame(picture::Scene::default(), SIZE) {

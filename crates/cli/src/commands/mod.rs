@@ -51,16 +51,10 @@ pub struct Cli {
 
 /// Returns the version, and on a second line the parts that were built in, which scripts/package reads.
 fn describe_build() -> String {
-    let parts = [
-        ("avx512", cfg!(feature = "avx512")),
-        ("camera", cfg!(feature = "camera")),
-        ("desktop", cfg!(feature = "desktop")),
-        ("gpu", cfg!(feature = "gpu")),
-        ("lab", cfg!(feature = "lab")),
-        ("networks", cfg!(feature = "networks")),
-        ("pipewire", cfg!(feature = "pipewire")),
-        ("window", cfg!(feature = "window")),
-    ];
+    macro_rules! parts {
+        ($($part:tt)*) => { [$(($part, cfg!(feature = $part))),*] };
+    }
+    let parts = parts!["avx512" "camera" "desktop" "gpu" "lab" "networks" "pipewire" "window"];
     let built_in: Vec<&str> = parts.iter().filter(|(_, is_built_in)| *is_built_in).map(|(part, _)| *part).collect();
     let built_in = if built_in.is_empty() { "no parts that can be left out".to_owned() } else { built_in.join(", ") };
     format!("{}\nbuilt with {built_in}", env!("CARGO_PKG_VERSION"))

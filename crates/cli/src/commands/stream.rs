@@ -11,8 +11,6 @@ use clap::Args;
 
 use control::{ControlServer, LookChanger, RunInfo, RunStats};
 
-#[cfg(feature = "window")]
-use crate::commands::preview;
 use crate::controlled;
 use crate::error::CliError;
 use crate::files::warn_of_leftovers;
@@ -73,18 +71,12 @@ pub struct StreamCommand {
     parts: options::Streaming,
     #[cfg(feature = "window")]
     #[command(flatten)]
-    window: options::Window,
+    window: options::window::Window,
 }
 
-#[cfg(feature = "window")]
 const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
                   pipewire:NAME), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv, \
                   .webm or .mov (ffmpeg), or null; may be given more than once";
-#[cfg(not(feature = "window"))]
-const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), filter (all readers of the source, \
-                  pipewire:NAME), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv, .webm \
-                  or .mov (ffmpeg), or null; may be given more than once";
-
 /// Runs the command; `given` serves warnings and the window. The report is written whenever the pipeline ran, even if
 /// it failed.
 ///
@@ -96,7 +88,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: GivenSettin
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
-        return preview::show_source(
+        return crate::commands::preview::show_source(
             &command.source.to_string(),
             &others,
             &command.window,

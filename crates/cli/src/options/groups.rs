@@ -2,8 +2,6 @@
 
 use clap::Args;
 
-#[cfg(feature = "window")]
-use super::Window;
 use super::{Blur, Computing, Depth, Frames, Networks, Output, Stereo, Stream};
 use bokehcam_live::source::Options;
 
@@ -78,7 +76,7 @@ pub struct Every {
     pub stream: Stream,
     #[cfg(feature = "window")]
     #[command(flatten)]
-    pub window: Window,
+    pub window: super::window::Window,
     /// Overwriting.
     #[command(flatten)]
     pub output: Output,

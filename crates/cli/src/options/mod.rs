@@ -3,7 +3,7 @@
 mod groups;
 mod look;
 #[cfg(feature = "window")]
-mod window;
+pub mod window;
 
 use std::path::PathBuf;
 
@@ -22,8 +22,6 @@ use bokehcam::look::number::{parse_positive, parse_switch, whole_number_parser};
 use bokehcam::names;
 use bokehcam_live::pipeline::Pace;
 use bokehcam_live::source::{DepthChoice, Size, SourceName};
-#[cfg(feature = "window")]
-pub use window::Window;
 
 names::named! {
     /// How log lines are written.

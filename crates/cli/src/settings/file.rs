@@ -9,9 +9,8 @@ use super::paths::resolve_paths;
 use super::table::{Values, is_setting, parse_flags, suggest_setting};
 use crate::error::CliError;
 use crate::log::{escape_controls, one_line};
-use bokehcam::look::{self, SETTINGS, presets};
-#[cfg(feature = "window")]
-use bokehcam::look::{Patch, presets::Preset};
+use bokehcam::look::presets::Preset;
+use bokehcam::look::{self, Patch, SETTINGS, presets};
 use bokehcam_media::files::data::user_dir;
 use bokehcam_media::files::input;
 
@@ -101,7 +100,6 @@ impl SettingsFile {
 
     /// Returns all presets, those of this file last. Unusable ones, for example with a missing aperture picture, are
     /// skipped with a warning.
-    #[cfg(feature = "window")]
     pub fn all_presets(&self) -> Vec<Preset> {
         let user_presets = self.presets.iter().filter_map(|(name, values)| {
             let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
@@ -204,7 +202,6 @@ pub fn user_file() -> Option<PathBuf> {
 }
 
 /// Returns the folder for remembered state: `$XDG_STATE_HOME/bokehcam`, or the equivalent under `~/.local/state`.
-#[cfg(feature = "window")]
 pub fn state_folder() -> Option<PathBuf> {
     app_folder("XDG_STATE_HOME", ".local/state")
 }

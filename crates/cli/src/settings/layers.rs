@@ -34,22 +34,18 @@ pub struct Setting {
 #[derive(Clone, Debug, Default)]
 pub struct GivenSettings {
     /// Options outside the look that flags and the environment set, as name and value.
-    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub switches: Vec<(String, String)>,
     /// Settings of the look that the environment, a snapshot, a preset or the file set: a command without them would
     /// get that value again, so it has to state even a default.
-    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub from_layers: Vec<String>,
     /// Settings from flags, environment and preset; from the preset only those that differ from the defaults.
     pub settings: Vec<Setting>,
     /// Names of all settings from flags, environment, preset or file.
-    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone has a default of its own"))]
     pub stated: Vec<String>,
 }
 
 impl GivenSettings {
     /// Whether flags, the environment or a preset set any part of the look.
-    #[cfg(feature = "window")]
     pub fn has_look(&self) -> bool {
         let is_look = |name: &str| name == "preset" || settings::find_setting(name).is_some();
         self.settings.iter().any(|setting| is_look(&setting.name))

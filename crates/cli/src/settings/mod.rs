@@ -2,7 +2,6 @@
 //! printing and saving.
 
 pub mod arguments;
-#[cfg(feature = "window")]
 pub mod command_line;
 pub mod dump;
 pub mod environment;
@@ -10,7 +9,6 @@ pub mod file;
 pub mod layers;
 pub mod look;
 pub mod paths;
-#[cfg(feature = "window")]
 pub mod presets;
 pub mod save;
 pub mod table;

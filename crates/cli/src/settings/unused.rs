@@ -201,7 +201,6 @@ pub fn describe_unused(changed: &[Value], run: &RunFacts) -> Option<String> {
 }
 
 /// Warns of the given settings without effect on this kind of source; all others can be changed in the window.
-#[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
     let run = RunFacts { source: FrameOrigin::Source(source), ..RunFacts::default() };
     format_line(find_unmet(NEEDS_OF_SOURCE, given, &run)).iter().for_each(|line| log::warn(line));
@@ -282,11 +281,10 @@ mod tests {
         let mut names: Vec<&str> =
             [NEEDS_OF_SOURCE, NEEDS].concat().iter().flat_map(|(names, _)| *names).copied().collect();
         let all = all_settings_command();
-        let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
         let is_of_window = |name: &&str| WINDOW_STATE.contains(name) || WINDOW_START.contains(name);
         let window = |name: &&str| cfg!(feature = "window") || !is_of_window(name);
-        assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
+        assert!(names.iter().all(|name| is_setting(name) || !window(name)), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
     }

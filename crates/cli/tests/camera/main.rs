@@ -6,7 +6,6 @@
 //!
 //! Emulated floating point is about 50 times slower than the processor's, so the blur's speed is not measured, and the
 //! blur runs on a few small frames only.
-#![cfg(feature = "camera")]
 
 mod demand;
 mod devices;

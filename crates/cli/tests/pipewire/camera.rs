@@ -5,7 +5,8 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use bokehcam::frame::YuyvImage;
-use bokehcam_live::sink::{Options, PipeWire, Sink};
+use bokehcam_live::sink::pipewire::PipeWire;
+use bokehcam_live::sink::{Options, Sink};
 use rustix::fs::inotify;
 use serde_json::Value;
 

@@ -10,7 +10,8 @@ use bokehcam::clock::Clock;
 use bokehcam::frame::ColorImage;
 use bokehcam_live::pipewire::mode::{Mode, NegotiatedFormat, Offer};
 use bokehcam_live::pipewire::reader::{Frame, PictureHandler, Reader};
-use bokehcam_live::sink::{Options, PipeWire, Sink};
+use bokehcam_live::sink::pipewire::PipeWire;
+use bokehcam_live::sink::{Options, Sink};
 
 use super::program::Beside;
 use super::session::{folder, until};

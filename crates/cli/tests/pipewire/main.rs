@@ -2,13 +2,11 @@
 //!
 //! `scripts/test` runs them if the daemons are installed. By hand: `crates/cli/tests/pipewire/session cargo test --test
 //! pipewire -- --include-ignored --test-threads=1`, with `--skip browsers::` if there are no browsers.
-#![cfg(feature = "pipewire")]
 #![allow(missing_docs)]
 
 mod browsers;
 mod camera;
 mod delay;
-#[cfg(feature = "camera")]
 mod filter;
 #[cfg(feature = "window")]
 #[path = "../../../../tests/common/heard.rs"]
@@ -19,7 +17,6 @@ mod preview;
 mod program;
 mod readers;
 mod session;
-#[cfg(feature = "camera")]
 mod source;
 #[cfg(feature = "window")]
 #[path = "../../../../tests/common/store.rs"]

@@ -4,9 +4,9 @@ use std::fs;
 
 use crate::program::{Home, Ran, run};
 
-mod commands;
 #[cfg(feature = "camera")]
-mod report;
+mod cameras;
+mod commands;
 mod service;
 
 /// Returns the value of a setting and its origin, as `config dump` prints them.
@@ -102,24 +102,6 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
     for (args, accepted) in cases {
         println!("{args:?}");
         run(args).refused(2, &[accepted]);
-    }
-}
-
-#[test]
-#[cfg(feature = "camera")]
-fn what_a_camera_cannot_do_is_said_in_one_line() {
-    let cases: [(&[&str], i32, &str); 6] = [
-        (&["--pace", "asap"], 2, "leave --pace out"),
-        (&["--start", "1"], 2, "--loop are for recordings and videos: a camera never ends"),
-        (&["--control", "exposure"], 2, "NAME=VALUE"),
-        (&["--format", "MJPEG"], 2, "such as MJPG"),
-        (&["--fps", "0"], 2, "from 0.1 to 1000"),
-        // A device that is not a camera.
-        (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is not a camera"),
-    ];
-    for (more, code, told) in cases {
-        println!("{more:?}");
-        run(&[&["stream", "/dev/null", "--to", "null"], more].concat()).refused(code, &[told]);
     }
 }
 

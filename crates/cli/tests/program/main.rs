@@ -21,8 +21,7 @@ mod cli;
 mod colors;
 mod ctl;
 mod damage;
-#[cfg(feature = "lab")]
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", feature = "lab"))]
 mod depth_on_gpu;
 mod disparity;
 // Its commands take every part that packages bring.
@@ -31,7 +30,6 @@ mod documents;
 mod fit;
 #[cfg(feature = "camera")]
 mod fuzz;
-#[cfg(feature = "gpu")]
 mod gpu_faults;
 mod heic;
 mod map_sequences;
@@ -42,7 +40,6 @@ mod outputs;
 mod packaging;
 mod plate;
 mod presets;
-#[cfg(feature = "window")]
 mod preview;
 mod record;
 mod render;

@@ -231,7 +231,7 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
         may_come.push(vec!["photo.png", "--depth", "/dev/video4711", "--to", "null"]);
         may_come.push(vec!["demo", "--to", "/dev/video4711"]);
     }
-    if cfg!(all(feature = "camera", feature = "pipewire")) {
+    if cfg!(feature = "pipewire") {
         may_come.push(vec!["pipewire:Nobody's camera", "--to", "null"]);
         may_come.push(vec!["demo", "--to", "pipewire"]);
     }

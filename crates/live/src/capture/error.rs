@@ -1,11 +1,8 @@
 //! Errors of frame sources.
 
-#[cfg(feature = "camera")]
+use std::error::Error;
+
 use super::pixels::NoColor;
-#[cfg(all(feature = "camera", feature = "pipewire"))]
-use crate::pipewire::PipeWireError;
-#[cfg(feature = "camera")]
-use crate::v4l2::live::OpenError;
 use bokehcam::frame::transform::Area;
 use bokehcam_media::recording::RecordingError;
 use bokehcam_media::video::VideoError;
@@ -88,15 +85,9 @@ pub enum CaptureError {
         size_px: (u32, u32),
     },
     /// The camera cannot be opened.
-    #[cfg(feature = "camera")]
     #[error(transparent)]
-    Camera(#[from] OpenError),
-    /// The PipeWire camera cannot be opened.
-    #[cfg(all(feature = "camera", feature = "pipewire"))]
-    #[error(transparent)]
-    PipeWire(#[from] PipeWireError),
+    Camera(Box<dyn Error + Send + Sync>),
     /// The camera delivers no colour pictures.
-    #[cfg(feature = "camera")]
     #[error("{camera}: {source}")]
     NoColor { camera: String, source: NoColor },
 }

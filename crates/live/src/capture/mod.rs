@@ -4,7 +4,7 @@ pub mod background;
 pub mod demo;
 mod error;
 pub mod photo;
-#[cfg(all(feature = "camera", feature = "pipewire"))]
+#[cfg(feature = "pipewire")]
 pub mod pipewire;
 pub mod pixels;
 pub mod replay;

@@ -67,7 +67,8 @@ impl PipeWireCamera {
             warned: false,
         };
         // Blocks until the camera has announced its format.
-        let (reader, camera, negotiated) = Reader::new(name, filters, picture_decoder)?;
+        let (reader, camera, negotiated) =
+            Reader::new(name, filters, picture_decoder).map_err(|error| CaptureError::Camera(error.into()))?;
         let interval = Interval { numerator: negotiated.rate.1, denominator: negotiated.rate.0 };
         let ((width, height), fourcc) = (negotiated.size, FourCc(negotiated.fourcc));
         let info = SourceInfo {

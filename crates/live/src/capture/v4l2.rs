@@ -45,7 +45,8 @@ impl V4l2Camera {
         frames: Option<u64>,
     ) -> Result<Self, CaptureError> {
         let clock = Clock::system();
-        let live = LiveDevice::open(name, request, settings, clock.clone())?;
+        let live = LiveDevice::open(name, request, settings, clock.clone())
+            .map_err(|error| CaptureError::Camera(error.into()))?;
         // The first layout fixes the size for the whole run.
         let layout = *live.layout();
         let decoder =

@@ -5,7 +5,7 @@
 //! ([`claim_name`]); [`client`] sends requests. Separate threads serve them: nothing here waits for a frame, and no frame
 //! waits for anything here.
 
-#[cfg(feature = "desktop")]
+#[cfg_attr(not(feature = "desktop"), path = "no_bus.rs")]
 pub mod bus;
 pub mod client;
 mod folder;

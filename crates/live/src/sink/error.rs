@@ -1,16 +1,8 @@
+use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "pipewire")]
-use crate::pipewire::PipeWireError;
-#[cfg(feature = "camera")]
-use crate::v4l2::loopback::LoopbackError;
 use bokehcam_media::files::folder::FolderError;
-
-const NO_WINDOW: &str = "a window needs a command that shows pictures, such as `bokehcam preview SOURCE`; for a folder of this name, give \
-     window/";
-const NOT_BUILT: &str = "this program was built without a window; build it with the feature window. For a folder of \
-                         this name, window/";
 
 /// Why a frame could not be written.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -18,10 +10,9 @@ const NOT_BUILT: &str = "this program was built without a window; build it with 
 pub enum SinkError {
     /// The name is not that of a sink.
     #[error(
-        "no sink '{name}'{}: use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/ (a folder, with the slash), FILE.y4m, \
+        "no sink '{name}'{}: use /dev/videoN or pipewire[:NAME] (a virtual camera), window, DIR/ (a folder, with the slash), FILE.y4m, \
          FILE.mp4, FILE.mkv, FILE.webm, FILE.mov, - (y4m on standard output) or null",
-        near.as_ref().map_or(String::new(), |near| format!(" (did you mean {near}?)")),
-        if cfg!(feature = "window") { "window, " } else { "" }
+        near.as_ref().map_or(String::new(), |near| format!(" (did you mean {near}?)"))
     )]
     Target {
         name: String,
@@ -115,18 +106,15 @@ pub enum SinkError {
         stderr: String,
     },
     /// A window where none can be opened.
-    #[error("{}", if cfg!(feature = "window") { NO_WINDOW } else { NOT_BUILT })]
+    #[error(
+        "a window needs a command that shows pictures, such as `bokehcam preview SOURCE`, in a program built with the feature \
+         window; for a folder of this name, give window/"
+    )]
     Window,
-    /// The virtual camera cannot be written to.
-    #[cfg(feature = "camera")]
+    /// The virtual camera cannot be written to, or PipeWire does not accept it.
     #[error(transparent)]
-    Loopback(#[from] LoopbackError),
-    /// PipeWire does not accept the virtual camera.
-    #[cfg(feature = "pipewire")]
-    #[error(transparent)]
-    PipeWire(#[from] PipeWireError),
+    Camera(Box<dyn Error + Send + Sync>),
     /// The program was built without PipeWire.
-    #[cfg(not(feature = "pipewire"))]
     #[error(
         "--to pipewire: this program was built without PipeWire; build it with the feature pipewire. For a folder of this \
          name, ./pipewire"
@@ -139,7 +127,6 @@ pub enum SinkError {
     #[error("--to filter is for a stream of a camera that PipeWire has: bokehcam stream pipewire:NAME --to filter")]
     Filter,
     /// The program was built without virtual cameras.
-    #[cfg(not(feature = "camera"))]
     #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]
     NoCamera { path: PathBuf },
 }

@@ -9,12 +9,12 @@ pub mod card;
 mod error;
 mod ffmpeg;
 #[cfg(feature = "camera")]
-mod loopback;
+pub mod loopback;
 mod output;
 mod output_thread;
 mod pipe;
 #[cfg(feature = "pipewire")]
-mod pipewire;
+pub mod pipewire;
 mod png;
 mod rate;
 mod rate_converter;
@@ -34,12 +34,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-#[cfg(feature = "pipewire")]
-pub use self::pipewire::PipeWire;
 pub use error::SinkError;
 pub use ffmpeg::Ffmpeg;
-#[cfg(feature = "camera")]
-pub use loopback::Loopback;
 pub use output::recover_videos;
 pub use output_thread::Backpressure;
 pub use pipe::Pipe;

@@ -189,6 +189,12 @@ impl PipeWire {
     }
 }
 
+impl From<PipeWireError> for SinkError {
+    fn from(error: PipeWireError) -> Self {
+        Self::Camera(error.into())
+    }
+}
+
 impl Sink for PipeWire {
     fn set_capture_time(&mut self, captured_ns: u64) {
         self.captured_ns = captured_ns;

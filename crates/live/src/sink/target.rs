@@ -6,10 +6,6 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-#[cfg(feature = "camera")]
-use super::Loopback;
-#[cfg(feature = "pipewire")]
-use super::PipeWire;
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use bokehcam::names::find_similar;
 use bokehcam_media::files::{folder, place};
@@ -118,14 +114,14 @@ impl Target {
             Self::Y4m(path) => Box::new(Y4mFile::create(path, options)?),
             Self::Video(path) => Box::new(Ffmpeg::create(path, options)?),
             #[cfg(feature = "camera")]
-            Self::Device(path) => Box::new(Loopback::open(path, options)?),
-            #[cfg(not(feature = "camera"))]
+            Self::Device(path) => Box::new(super::loopback::Loopback::open(path, options)?),
+            #[cfg(feature = "pipewire")]
+            Self::PipeWire(label) => Box::new(super::pipewire::PipeWire::open(label.as_deref(), options)?),
+            #[cfg(feature = "pipewire")]
+            Self::Filter => Box::new(super::pipewire::PipeWire::open_filter(options)?),
+            #[allow(unreachable_patterns, reason = "in a build with all features")]
             Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
-            #[cfg(feature = "pipewire")]
-            Self::PipeWire(label) => Box::new(PipeWire::open(label.as_deref(), options)?),
-            #[cfg(feature = "pipewire")]
-            Self::Filter => Box::new(PipeWire::open_filter(options)?),
-            #[cfg(not(feature = "pipewire"))]
+            #[allow(unreachable_patterns, reason = "in a build with all features")]
             Self::PipeWire(_) | Self::Filter => return Err(SinkError::NoPipeWire),
             Self::Window => return Err(SinkError::Window),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),

@@ -1,12 +1,8 @@
 //! Lists the cameras, virtual cameras and camera controls of this machine. A build without cameras has none.
 
-use super::SourceName;
-use crate::camera_control::CameraControl;
-#[cfg(feature = "camera")]
-use crate::v4l2::{
-    live::user_controls,
-    node::{self, Kind, Node},
-};
+pub use super::cameras::{list_cameras, list_controls, set_control};
+pub use super::pipewire_cameras::list_pipewire_cameras;
+use super::{SourceName, cameras, pipewire_cameras};
 
 /// A device to choose.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,95 +30,18 @@ impl Choice {
     }
 }
 
-/// Returns the cameras.
-pub fn list_cameras() -> Vec<Choice> {
-    #[cfg(feature = "camera")]
-    return list_devices(Kind::Capture);
-    #[cfg(not(feature = "camera"))]
-    return Vec::new();
-}
-
-/// Returns the cameras that only PipeWire has, without this program's own and those of [`list_cameras`].
-pub fn list_pipewire_cameras() -> Vec<Choice> {
-    #[cfg(feature = "pipewire")]
-    {
-        let graph = crate::pipewire::graph::Graph::list_without_modes().unwrap_or_default();
-        let is_other = |source: &crate::pipewire::graph::Source| {
-            source.is_camera && !source.is_ours() && !source.name.starts_with("v4l2_")
-        };
-        let choice = |source: crate::pipewire::graph::Source| Choice {
-            name: format!("pipewire:{}", source.name),
-            label: source.label,
-        };
-        graph.sources.into_iter().filter(is_other).map(choice).collect()
-    }
-    #[cfg(not(feature = "pipewire"))]
-    Vec::new()
-}
-
 /// Returns the virtual cameras that could be written to.
 pub fn list_virtual_cameras() -> Vec<Choice> {
-    #[cfg(feature = "camera")]
-    let mut found = list_devices(Kind::Virtual);
-    #[cfg(not(feature = "camera"))]
-    let mut found = Vec::new();
-    found.extend(find_pipewire_output());
-    found
-}
-
-/// Returns the camera that this program would offer in PipeWire, if PipeWire runs.
-fn find_pipewire_output() -> Option<Choice> {
-    #[cfg(feature = "pipewire")]
-    return crate::pipewire::is_available()
-        .then(|| Choice { name: "pipewire".to_owned(), label: "bokehcam (PipeWire)".to_owned() });
-    #[cfg(not(feature = "pipewire"))]
-    return None;
-}
-
-#[cfg(feature = "camera")]
-fn list_devices(kind: Kind) -> Vec<Choice> {
-    let of_kind = |node: &Node| node.kind == kind && (kind == Kind::Virtual || node.captures);
-    let choice = |node: Node| {
-        let name = node.path.display().to_string();
-        let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.card) };
-        Choice { name, label }
-    };
-    node::list_nodes().into_iter().filter(of_kind).map(choice).collect()
+    cameras::list_virtual_cameras().into_iter().chain(pipewire_cameras::find_output()).collect()
 }
 
 /// Returns the camera whose controls can be changed while `source` runs; `None` for a pair, whose pictures must stay
 /// alike.
 pub fn controllable_camera(source: &SourceName) -> Option<String> {
     match source {
-        #[cfg(feature = "camera")]
         SourceName::Camera(camera) => Some(camera.node().display().to_string()),
         _ => None,
     }
-}
-
-/// Returns the controls of a camera; empty if it has none, or on an error (which is logged).
-pub fn list_controls(camera: &str) -> Vec<CameraControl> {
-    #[cfg(feature = "camera")]
-    return user_controls::list_user_controls(camera).unwrap_or_else(|error| {
-        tracing::info!("{error}");
-        Vec::new()
-    });
-    #[cfg(not(feature = "camera"))]
-    return {
-        let _ = camera;
-        Vec::new()
-    };
-}
-
-/// Sets a control of a camera; returns all its controls, since others may change as well.
-///
-/// # Errors
-/// Returns one line for users if the camera refuses.
-pub fn set_control(camera: &str, control: &str, value: i64) -> Result<Vec<CameraControl>, String> {
-    #[cfg(feature = "camera")]
-    return user_controls::set_user_control(camera, control, value).map_err(|error| error.to_string());
-    #[cfg(not(feature = "camera"))]
-    return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {control} cannot be {value}"));
 }
 
 /// Watches for cameras that come and go, without opening any.
@@ -132,21 +51,13 @@ pub struct CameraWatch {
     nodes: Vec<String>,
     /// Whether the last check found a change.
     has_changed: bool,
-    #[cfg(feature = "pipewire")]
-    pipewire: Option<crate::pipewire::watch::SourceWatch>,
+    pipewire: Option<pipewire_cameras::SourceWatch>,
 }
 
 impl CameraWatch {
     /// Starts to watch.
     pub fn new() -> Self {
-        Self {
-            nodes: list_video_nodes(),
-            has_changed: false,
-            #[cfg(feature = "pipewire")]
-            pipewire: crate::pipewire::watch::SourceWatch::new()
-                .inspect_err(|error| tracing::debug!("cameras of PipeWire are not watched: {error}"))
-                .ok(),
-        }
+        Self { nodes: list_video_nodes(), has_changed: false, pipewire: pipewire_cameras::watch() }
     }
 
     /// Whether cameras came or went since the last check. A change is reported once more by the next check: a new device
@@ -154,7 +65,6 @@ impl CameraWatch {
     pub fn has_changed(&mut self) -> bool {
         let nodes = list_video_nodes();
         let changed = std::mem::replace(&mut self.nodes, nodes) != self.nodes;
-        #[cfg(feature = "pipewire")]
         let changed = self.pipewire.as_ref().is_some_and(|watch| watch.take_change()) || changed;
         std::mem::replace(&mut self.has_changed, changed) || changed
     }

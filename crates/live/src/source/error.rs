@@ -1,5 +1,6 @@
 //! Errors of opening a source.
 
+use std::error::Error;
 use std::io;
 use std::path::PathBuf;
 
@@ -43,9 +44,8 @@ pub enum SourceError {
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The depth camera cannot be opened.
-    #[cfg(feature = "camera")]
     #[error("--depth: {0}")]
-    DepthCamera(#[from] crate::v4l2::live::OpenError),
+    DepthCamera(Box<dyn Error + Send + Sync>),
 }
 
 impl SourceError {

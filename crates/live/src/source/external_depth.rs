@@ -5,7 +5,7 @@ use std::path::Path;
 use super::opened::recorded_depth_origin;
 use super::orientation::SourceTransform;
 use super::{
-    DepthChoice, DepthOrigin, Frames, OpenRequest, Options, Source, SourceError, SourceName, options, registration,
+    DepthChoice, DepthOrigin, Frames, OpenRequest, Options, Source, SourceError, SourceName, cameras, registration,
     single_camera, video,
 };
 use crate::capture::{CaptureError, FrameData};
@@ -52,7 +52,7 @@ pub(super) fn add_external_depth(
         DepthChoice::Video(file) => {
             (Box::new(video::open_depth(file, transform.own_px, name, depth)?), DepthOrigin::Relative)
         }
-        DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
+        DepthChoice::Device(name) => (cameras::open_depth_camera(name, depth, clock)?, DepthOrigin::Units),
         DepthChoice::SingleCamera(chosen) => return single_camera::add_depth(source, chosen, name, request),
         DepthChoice::Defocus => {
             return SourceError::usage_error(
@@ -105,29 +105,4 @@ fn last_played_frame(frames: &Frames, period_ns: u64) -> Option<u64> {
     let before = |seconds: f64| (seconds * 1e9 / period_ns as f64).ceil() as u64;
     let by_count = frames.frames.map(|count| before(frames.start.unwrap_or(0.0)).saturating_add(count));
     [by_count, frames.end.map(before)].into_iter().flatten().min()
-}
-
-/// Opens the depth camera `name` with scale and registration from the options.
-#[cfg(feature = "camera")]
-fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
-    use crate::depth::live::{LiveDepth, Units};
-    use crate::v4l2::live::OpenError;
-    let registration = registration::open(options, None)?;
-    let units = Units { per_m: options.live_scale(), invalid: options.depth_invalid };
-    match LiveDepth::open(name, units, registration, clock.clone()) {
-        Ok(camera) => Ok(Box::new(camera)),
-        // Probably a mistyped keyword or folder.
-        Err(error @ OpenError::Name(_)) => Err(SourceError::NotFound(format!(
-            "--depth {name}: {}{error}; or use auto, recorded, stereo, none, matte, mono, plate, a recording or a video of depth",
-            DepthChoice::suggest_keyword(name)
-        ))),
-        Err(error) => Err(error.into()),
-    }
-}
-
-#[cfg(not(feature = "camera"))]
-fn open_depth_camera(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
-    Err(SourceError::NotFound(format!(
-        "--depth {name}: there is no such folder, and this build leaves cameras out (feature `camera`)"
-    )))
 }

@@ -1,10 +1,14 @@
-//! Searches the data folders of the user and the system for networks.
+//! Searches the data folders of the user and the system for networks, and opens them.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
+use super::networks::Opened;
+use super::options::{Order, Range};
+use super::{NetworkFile, OpenRequest, SingleCameraDepth, SourceError};
+use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
 use bokehcam_media::files::{data, input};
-use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES, Task};
+use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES, Scaling, Task};
 
 /// Names the folder of networks that takes the place of those beside the program.
 const VARIABLE: &str = "BOKEHCAM_MODELS";
@@ -77,6 +81,53 @@ pub fn find_best_in(folders: Vec<PathBuf>, task: Task) -> Option<PathBuf> {
     find_known_in(folders).into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
 }
 
+/// Opens the networks `chosen`, for a look.
+///
+/// # Errors
+/// A network is not installed or cannot be used.
+pub(super) fn open_networks(chosen: &SingleCameraDepth, request: &OpenRequest) -> Result<Opened, SourceError> {
+    let file = |chosen: &Option<NetworkFile>, task: Task| {
+        match chosen {
+        None => Ok(None),
+        Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
+        Some(NetworkFile::Installed) => find_best(task).map(Some).ok_or_else(|| {
+            SourceError::NotFound(format!(
+                "--depth {task}: no network for it is installed: `bokehcam models get {known}`, or name a file: --depth {task}:FILE",
+                known = KNOWN_NETWORKS.iter().find(|known| known.task == task).map_or("", |known| known.file),
+                task = task.name()
+            ))
+        }),
+    }
+    };
+    let (matte, mono) = (file(&chosen.matte, Task::Matte)?, file(&chosen.mono, Task::Mono)?);
+    let options = &request.options.networks;
+    let hints = Hints {
+        scaling: options.network_range.map(scaling),
+        bgr: options.network_order.map(|order| order == Order::Bgr),
+    };
+    let networks = SingleCamera::open(matte.as_deref(), mono.as_deref(), &hints)?;
+    let about = networks.describe();
+    Ok((Box::new(networks), about))
+}
+
+/// Returns the scaling of a picture's codes.
+fn scaling(range: Range) -> Scaling {
+    match range {
+        Range::Unit => Scaling::UNIT,
+        Range::Signed => Scaling::SIGNED,
+        Range::Codes => Scaling::CODES,
+        Range::Imagenet => Scaling::IMAGENET,
+    }
+}
+
+/// Returns the best installed networks, if any.
+pub fn find_each_best() -> SingleCameraDepth {
+    let installed = installed_networks();
+    let best =
+        |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
+    SingleCameraDepth { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,5 +143,22 @@ mod tests {
         // Tests of a build are not the program.
         assert!(!is_in("/b/target/debug/deps/bokehcam-0123", "/b/target/models"));
         assert_eq!(folders("/"), Vec::<PathBuf>::new());
+    }
+
+    #[test]
+    fn a_range_is_what_black_and_white_become() {
+        for (range, black, white) in [
+            (Range::Unit, 0.0, 1.0),
+            (Range::Signed, -1.0, 1.0),
+            (Range::Codes, 0.0, 255.0),
+            // For red: (0 - 0.485) / 0.229 and (1 - 0.485) / 0.229.
+            (Range::Imagenet, -2.117_904, 2.248_908),
+        ] {
+            let Scaling { mean, divisor } = scaling(range);
+            for (code, expected) in [(0.0, black), (255.0, white)] {
+                let became: f32 = (code - mean[0]) / divisor[0];
+                assert!((became - expected).abs() < 1e-4, "{}: {code} became {became}", range.name());
+            }
+        }
     }
 }

@@ -13,11 +13,13 @@
 //! ```
 
 pub mod calib;
+#[cfg_attr(not(feature = "camera"), path = "no_cameras.rs")]
+mod cameras;
 mod containers;
 pub mod devices;
 mod error;
 mod external_depth;
-#[cfg(feature = "networks")]
+#[cfg_attr(not(feature = "networks"), path = "no_networks.rs")]
 pub mod installed;
 mod look_files;
 pub mod modes;
@@ -27,6 +29,8 @@ mod opened;
 pub mod options;
 pub mod orientation;
 pub mod photo;
+#[cfg_attr(not(feature = "pipewire"), path = "no_pipewire_cameras.rs")]
+mod pipewire_cameras;
 pub mod registration;
 pub mod single_camera;
 mod stereo;
@@ -34,9 +38,10 @@ mod suggestion;
 pub mod video;
 
 pub use error::SourceError;
+pub use installed::find_each_best as installed_networks;
 pub use look_files::register_look_files;
 pub use name::{Kind, SourceName};
-pub use networks::{find_person, installed_networks};
+pub use networks::find_person;
 use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, Orientation, PlateFile, SingleCameraDepth, Size};
 use orientation::SourceTransform;

@@ -5,10 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{DepthOrigin, Frames, Source, SourceError, containers, suggestion, video};
+use super::{DepthOrigin, Frames, Source, SourceError, cameras, containers, pipewire_cameras, suggestion, video};
 use crate::capture::{demo, y4m};
-#[cfg(feature = "camera")]
-use crate::v4l2::node::NodeError;
 use bokehcam_media::recording::{is_recording_file, pictures, still};
 
 /// The name of the synthetic scene.
@@ -53,12 +51,11 @@ impl Kind {
 }
 
 /// A camera: the name from the user, and the device node that it resolved to.
-#[cfg(feature = "camera")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
     /// The name as written by the user.
     pub name: String,
-    node: PathBuf,
+    pub(super) node: PathBuf,
 }
 
 /// The name of a source.
@@ -77,13 +74,10 @@ pub enum SourceName {
     /// A stream of y4m on standard input.
     Stdin,
     /// A camera.
-    #[cfg(feature = "camera")]
     Camera(NamedCamera),
     /// A PipeWire camera, by the name after `pipewire:`.
-    #[cfg(all(feature = "camera", feature = "pipewire"))]
     PipeWire(String),
     /// Two cameras, the left one first.
-    #[cfg(feature = "camera")]
     Cameras([NamedCamera; 2]),
 }
 
@@ -107,40 +101,35 @@ impl fmt::Display for SourceName {
             SourceName::Demo => f.write_str(demo::NAME),
             SourceName::Stdin => f.write_str(y4m::NAME),
             SourceName::Folder(path) | SourceName::Photo(path) | SourceName::Video(path) => path.display().fmt(f),
-            #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
             SourceName::PipeWire(name) => write!(f, "{PIPEWIRE}{name}"),
-            #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => write!(f, "{},{}", left.name, right.name),
         }
     }
 }
 
 /// Returns the accepted sources, for messages.
-fn accepted_sources() -> &'static str {
-    match cfg!(feature = "camera") {
-        true if cfg!(feature = "pipewire") => {
-            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
-        }
-        true => {
-            "a camera, two cameras LEFT,RIGHT, a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
-        }
-        false => {
-            "a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or Kinect's .mkv file, demo or synthetic"
-        }
-    }
+pub(super) fn accepted_sources() -> String {
+    let cameras = match (cfg!(feature = "camera"), cfg!(feature = "pipewire")) {
+        (false, _) => "",
+        (true, false) => "a camera, two cameras LEFT,RIGHT, ",
+        (true, true) => "a camera, pipewire:NAME, two cameras LEFT,RIGHT, ",
+    };
+    format!(
+        "{cameras}a photo, a video, - (y4m on standard input), a folder with a recording or pictures, a .mcap, .r3d or \
+         Kinect's .mkv file, demo or synthetic"
+    )
 }
 
 /// Returns whether a text is meant as the name of a file: it has an extension, such as `clip.mp4`.
-fn is_file_name(text: &str) -> bool {
+pub(super) fn is_file_name(text: &str) -> bool {
     const MAX_LETTERS: usize = 5;
     let is_extension = |text: &str| text.len() <= MAX_LETTERS && text.bytes().any(|byte| byte.is_ascii_alphabetic());
     !text.starts_with("/dev/") && Path::new(text).extension().is_some_and(|end| end.to_str().is_some_and(is_extension))
 }
 
 /// Creates the error for a missing file or folder; suggests a sibling with a similar name.
-fn missing_path_error(text: &str) -> SourceError {
+pub(super) fn missing_path_error(text: &str) -> SourceError {
     let path = Path::new(text);
     let is_file = is_file_name(text);
     let near = suggestion::find_similar(path, if is_file { Path::is_file } else { Path::is_dir });
@@ -151,73 +140,6 @@ fn missing_path_error(text: &str) -> SourceError {
     })
 }
 
-/// Parses the name of one camera, or of two as `LEFT,RIGHT`; errors suggest similar names.
-#[cfg(feature = "camera")]
-fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
-    let named = |name: &str| {
-        let node = crate::v4l2::node::resolve_node(name)?;
-        Ok(NamedCamera { name: name.to_owned(), node })
-    };
-    let refuse = |error: NodeError| {
-        if is_file_name(text) && matches!(error, NodeError::NotFound { .. }) {
-            return Err(missing_path_error(text));
-        }
-        Err(SourceError::NotFound(match suggestion::find_similar(Path::new(text), Path::is_dir) {
-            Some(near) => format!("{error}; or did you mean the folder {}? Use {}", near.display(), accepted_sources()),
-            None => format!("{error}; use {}", accepted_sources()),
-        }))
-    };
-    // Try a single camera first, as its own name may contain commas.
-    let not_one_camera = match named(text) {
-        Ok(camera) => return Ok(SourceName::Camera(camera)),
-        Err(error) => error,
-    };
-    // For the same reason, try every comma as the separator.
-    let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
-    let pairs = || text.match_indices(',').map(halves);
-    for (left, right) in pairs() {
-        if let (Ok(left), Ok(right)) = (named(left), named(right)) {
-            let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
-            if same(&left.node, &right.node) {
-                let what = format!("left and right are the same camera, {}", left.node.display());
-                // If the names differ, the other camera may just not be plugged in.
-                let may_come = left.name != right.name;
-                return Err(if may_come { SourceError::NotFound(what) } else { SourceError::Usage(what) });
-            }
-            return Ok(SourceName::Cameras([left, right]));
-        }
-    }
-    match pairs().next() {
-        None => refuse(not_one_camera),
-        // Report the half that is no camera.
-        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(not_one_camera)),
-    }
-}
-
-/// Parses the name after `pipewire:`; its existence is checked when it is opened.
-fn parse_pipewire(name: &str) -> Result<SourceName, SourceError> {
-    #[cfg(all(feature = "camera", feature = "pipewire"))]
-    return match name.is_empty() {
-        true => SourceError::usage_error("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them"),
-        false => Ok(SourceName::PipeWire(name.to_owned())),
-    };
-    #[cfg(not(all(feature = "camera", feature = "pipewire")))]
-    return SourceError::usage_error(format!(
-        "this build leaves PipeWire's cameras out (features `camera` and `pipewire`): {name} cannot be read"
-    ));
-}
-
-#[cfg(not(feature = "camera"))]
-fn parse_cameras(text: &str) -> Result<SourceName, SourceError> {
-    let what = "this build leaves cameras out (feature `camera`)";
-    Err(match text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
-        true => SourceError::Usage(format!("{what}: use {}", accepted_sources())),
-        false if is_file_name(text) => missing_path_error(text),
-        false => SourceError::NotFound(format!("there is no such folder, and {what}: use {}", accepted_sources())),
-    })
-}
-
-#[cfg(feature = "camera")]
 impl NamedCamera {
     pub fn node(&self) -> &Path {
         &self.node
@@ -232,7 +154,7 @@ impl SourceName {
     pub fn parse_os(name: &OsStr) -> Result<Self, SourceError> {
         let path = Path::new(name);
         match name.to_str() {
-            Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
+            Some(text) if text.starts_with(PIPEWIRE) => pipewire_cameras::parse(&text[PIPEWIRE.len()..]),
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
             Some(y4m::NAME) => Ok(SourceName::Stdin),
@@ -249,7 +171,7 @@ impl SourceName {
             _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
             Some(text) if is_path(text) => Err(missing_path_error(text)),
             Some("") => SourceError::usage_error(format!("the name is empty: use {}", accepted_sources())),
-            Some(text) => parse_cameras(text),
+            Some(text) => cameras::parse(text),
             None => Err(missing_path_error(&path.display().to_string())),
         }
     }
@@ -257,7 +179,6 @@ impl SourceName {
     /// Returns the name, or part of it, of a PipeWire camera.
     pub fn pipewire_name(&self) -> Option<&str> {
         match self {
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
             Self::PipeWire(name) => Some(name),
             _ => None,
         }
@@ -272,10 +193,7 @@ impl SourceName {
             SourceName::Photo(_) => Kind::Photo,
             SourceName::Video(_) => Kind::Video,
             SourceName::Stdin => Kind::Stdin,
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
-            SourceName::PipeWire(_) => Kind::Camera,
-            #[cfg(feature = "camera")]
-            SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
+            SourceName::PipeWire(_) | SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
         }
     }
 
@@ -298,10 +216,7 @@ impl SourceName {
                 return Err(SourceError::Usage(what.to_owned()));
             }
             SourceName::Stdin => return Ok(()),
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
-            SourceName::PipeWire(_) => "a camera",
-            #[cfg(feature = "camera")]
-            SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
+            SourceName::PipeWire(_) | SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
         };
         if frames.start.is_none() && frames.end.is_none() && !frames.repeat {
             return Ok(());
@@ -337,14 +252,9 @@ impl SourceName {
     /// Returns the device nodes of its cameras.
     pub fn device_nodes(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Demo | SourceName::Stdin => Vec::new(),
-            SourceName::Folder(_) | SourceName::Photo(_) | SourceName::Video(_) => Vec::new(),
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
-            SourceName::PipeWire(_) => Vec::new(),
-            #[cfg(feature = "camera")]
             SourceName::Camera(camera) => vec![&camera.node],
-            #[cfg(feature = "camera")]
             SourceName::Cameras(cameras) => cameras.iter().map(|camera| camera.node.as_path()).collect(),
+            _ => Vec::new(),
         }
     }
 }

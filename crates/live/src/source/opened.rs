@@ -2,36 +2,22 @@
 
 use std::sync::Arc;
 
-#[cfg(feature = "camera")]
-use super::name;
 use super::{
-    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, photo,
-    registration, video,
+    DepthChoice, DepthOrigin, Findings, Frames, OpenRequest, Options, Size, SourceError, SourceName, cameras, photo,
+    pipewire_cameras, registration, video,
 };
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
-#[cfg(all(feature = "camera", feature = "pipewire"))]
-use crate::capture::pipewire::PipeWireCamera;
 use crate::capture::replay::Replay;
-#[cfg(feature = "camera")]
-use crate::capture::stereo_pair::StereoPair;
 use crate::capture::synthetic::{self, Format};
-#[cfg(feature = "camera")]
-use crate::capture::v4l2::V4l2Camera;
 use crate::capture::y4m::Y4m;
-#[cfg(feature = "camera")]
-use crate::v4l2::live::ModeRequest;
-#[cfg(feature = "camera")]
-use bokehcam::clock::Clock;
 use bokehcam::compute::thread_pool::core_count;
 use bokehcam::depth::DepthSource;
 use bokehcam::depth::constant::ConstantDepth;
 use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::frame::DepthMap;
 use bokehcam_media::depth::recorded::RecordedDepth;
-#[cfg(feature = "camera")]
-use bokehcam_media::layout::Content;
 use bokehcam_media::recording::depth_file::describe_stretch;
 use bokehcam_media::recording::{Recording, StereoGeometry};
 
@@ -118,33 +104,10 @@ impl Opened {
                 // A seek would lose count of the frames.
                 Ok(without_depth(Box::new(video::open(path, frames, depth_choice.counts_frames())?)))
             }
-            #[cfg(feature = "camera")]
-            SourceName::Camera(camera) => {
-                let camera =
-                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), frames.frames)?;
-                Ok(without_depth(Box::new(camera)))
-            }
-            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::Camera(camera) => Ok(without_depth(cameras::open(camera, frames)?)),
+            SourceName::Cameras(pair) => Ok(without_depth(cameras::open_pair(pair, frames)?)),
             SourceName::PipeWire(name) => {
-                if let Some((control, value)) = frames.control.first() {
-                    let what =
-                        format!("--control {control}={value}: a PipeWire camera has no controls; use its /dev/videoN");
-                    return SourceError::usage_error(what);
-                }
-                Ok(without_depth(Box::new(PipeWireCamera::open(
-                    name,
-                    request.options.filters,
-                    camera_request(frames),
-                    frames.frames,
-                )?)))
-            }
-            #[cfg(feature = "camera")]
-            SourceName::Cameras([left, right]) => {
-                let open = |camera: &name::NamedCamera| {
-                    V4l2Camera::open(&camera.name, camera_request(frames), frames.control.clone(), None)
-                };
-                let pair = StereoPair::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
-                Ok(without_depth(Box::new(pair)))
+                Ok(without_depth(pipewire_cameras::open(name, request.options.filters, frames)?))
             }
         }
     }
@@ -170,15 +133,5 @@ fn warn_of_own_properties(recording: &Recording, frames: &Frames) {
     }
     if let Some(Size { width, height }) = frames.size.filter(|_| !recording.is_chosen_by_size()) {
         tracing::warn!("without effect here: --size {width}x{height} (a recording has its own)");
-    }
-}
-
-#[cfg(feature = "camera")]
-fn camera_request(frames: &Frames) -> ModeRequest {
-    ModeRequest {
-        content: Content::Color,
-        size_px: frames.size.map(|size| (size.width, size.height)),
-        fps: frames.fps,
-        fourcc: frames.format,
     }
 }

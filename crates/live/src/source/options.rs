@@ -12,24 +12,20 @@ use std::str::FromStr;
 use clap::Args;
 
 use super::{SourceError, video::is_video};
-#[cfg(feature = "camera")]
-use crate::v4l2::{FourCc, live::Setting};
 use bokehcam::depth::stereo::Settings;
 use bokehcam::look::number::{in_range_parser, parse_count, parse_positive, parse_switch, whole_number_parser};
 use bokehcam::look::{LookFacts, Metres};
 use bokehcam::names;
+use bokehcam_media::layout::FourCc;
 use bokehcam_media::recording::depth_file::{self, Fit};
 use bokehcam_media::recording::map_sequence::is_map_folder;
 use bokehcam_media::recording::{DepthUnit, is_recording_file};
 pub use orientation::Orientation;
-pub use single_camera::{NetworkFile, Networks, PlateFile, SingleCameraDepth};
-#[cfg(feature = "networks")]
-pub use single_camera::{Order, Range};
+pub use single_camera::{NetworkFile, Networks, Order, PlateFile, Range, SingleCameraDepth};
 
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
 /// Units of a depth camera per metre: most use millimetres.
-#[cfg(feature = "camera")]
 const LIVE_DEPTH_SCALE: f32 = 1000.0;
 
 /// Which frames of which source.
@@ -68,13 +64,11 @@ pub struct Frames {
     #[command(flatten)]
     pub orientation: Orientation,
     /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: the best for its connection]
-    #[cfg(feature = "camera")]
     #[arg(long, value_name = "FOURCC")]
     pub format: Option<FourCc>,
     /// Set a control of the camera; may be given more than once, or as a list with commas
-    #[cfg(feature = "camera")]
     #[arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = parse_control)]
-    pub control: Vec<Setting>,
+    pub control: Vec<(String, String)>,
 }
 
 /// How depth pictures are read.
@@ -133,7 +127,6 @@ impl Depth {
     }
 
     /// Returns the units per metre of a depth camera.
-    #[cfg(feature = "camera")]
     pub fn live_scale(&self) -> f32 {
         self.depth_scale.unwrap_or(LIVE_DEPTH_SCALE)
     }
@@ -278,8 +271,7 @@ impl FromStr for Size {
 }
 
 /// Parses `NAME=VALUE`; whether the camera has such a control is checked when it is open.
-#[cfg(feature = "camera")]
-fn parse_control(text: &str) -> Result<Setting, String> {
+fn parse_control(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
     let (name, value) = parts
         .filter(|(name, _)| !name.is_empty())

@@ -4,7 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{
-    DepthOrigin, OpenRequest, Options, PlateFile, SingleCameraDepth, Source, SourceError, SourceName, networks,
+    DepthOrigin, OpenRequest, Options, PlateFile, SingleCameraDepth, Source, SourceError, SourceName, cameras, devices,
+    networks,
 };
 use bokehcam::depth::plate::{CameraLock, Guide, PlateDepth, Step};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
@@ -100,19 +101,7 @@ fn read_plate(file: &Path, (width, height): (u32, u32)) -> Result<ColorImage, So
 
 /// Returns the function that locks the camera's exposure, white balance and focus while a plate is used.
 fn create_lock(name: &SourceName) -> Option<CameraLock> {
-    #[cfg(feature = "camera")]
-    if let Some(camera) = super::devices::controllable_camera(name) {
-        use crate::v4l2::live::auto_lock::AutoLock;
-        return Some(Box::new(move || match AutoLock::new(&camera) {
-            Ok(held) => Some(Box::new(held)),
-            Err(error) => {
-                tracing::warn!("{error}: its exposure may change, and the plate is corrected as far as possible");
-                None
-            }
-        }));
-    }
-    let _ = name;
-    None
+    devices::controllable_camera(name).and_then(cameras::create_lock)
 }
 
 /// Creates a plate source for the pictures of a camera, with its progress, for a program that only takes a plate.

@@ -1,11 +1,10 @@
-//! The picture to measure with, and its exact depth: the synthetic scene if built in, else the demonstration.
+//! The picture to measure with, and its exact depth: the synthetic scene.
 
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::names::named;
 
 use crate::error::CliError;
 
-#[cfg(feature = "lab")]
 named! {
     /// The picture that is blurred.
     pub enum Scene default Sitter {
@@ -16,20 +15,10 @@ named! {
     }
 }
 
-#[cfg(not(feature = "lab"))]
-named! {
-    /// The picture that is blurred.
-    pub enum Scene default Demo {
-        /// The first picture of the demonstration
-        Demo = "demo",
-    }
-}
-
 /// Renders the first frame of the scene, one ray per pixel.
 ///
 /// # Errors
 /// Never fails in this configuration.
-#[cfg(feature = "lab")]
 pub fn render_first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
     use bokehcam_lab::scene::{Scene as Rendered, View};
     let scene_model = match scene {
@@ -39,30 +28,5 @@ pub fn render_first_frame(scene: Scene, size: (u32, u32)) -> Result<(ColorImage,
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
     let threads = bokehcam::compute::thread_pool::core_count();
     scene_model.render_pinhole(&View::new(size.0, size.1), 0.0, 1, threads, &mut color, &mut depth);
-    Ok((color, depth))
-}
-
-/// Returns the first frame of the demonstration, resampled to nearest neighbours.
-///
-/// # Errors
-/// Fails if the demonstration cannot be decoded.
-#[cfg(not(feature = "lab"))]
-pub fn render_first_frame(_: Scene, (width, height): (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
-    use bokehcam_live::capture::{Camera, FrameBuffers, demo::Demo};
-    let (mut demo_color, mut demo_depth) = (ColorImage::default(), DepthMap::default());
-    Demo::new(Some(1))?.next(FrameBuffers {
-        color: &mut demo_color,
-        depth: &mut demo_depth,
-        right: &mut Default::default(),
-    })?;
-    let (mut color, mut depth) = (ColorImage::new(width, height), DepthMap::new(width, height));
-    let demo_size = demo_color.size();
-    let pixels = color.rgb.chunks_exact_mut(3).zip(&mut depth.metres);
-    for (k, (rgb, metres)) in pixels.enumerate() {
-        let (x, y) = (k as u32 % width, k as u32 / width);
-        let nearest = (y * demo_size.1 / height * demo_size.0 + x * demo_size.0 / width) as usize;
-        rgb.copy_from_slice(&demo_color.rgb[nearest * 3..][..3]);
-        *metres = demo_depth.metres[nearest];
-    }
     Ok((color, depth))
 }

@@ -67,7 +67,8 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     print_to_stdout(list.to_string().as_bytes())
 }
 
-/// See [`super::format_devices`].
+/// Formats cameras, and nodes that may be cameras, as the command lists them; without links, whose names contain serial
+/// numbers.
 pub fn format_devices(nodes: &[Node]) -> String {
     let nodes = nodes.iter().map(|node| Node { links: Vec::new(), ..node.clone() });
     let list = List { pipewire: pipewire_cameras::list_cameras(), ..List::from_nodes(nodes.collect(), false, false) };
@@ -85,7 +86,7 @@ fn find_nodes(name: &str) -> Result<Vec<Node>, CliError> {
             let wanted = name.to_lowercase();
             let by_card = |node: &Node| !name.is_empty() && node.card.to_lowercase().contains(&wanted);
             let found: Vec<Node> = nodes.into_iter().filter(by_card).collect();
-            return if found.is_empty() { Err(error.into()) } else { Ok(found) };
+            return if found.is_empty() { Err(CliError::Part(error.into())) } else { Ok(found) };
         }
     };
     // Nodes are listed by their real paths, and this may be a link.

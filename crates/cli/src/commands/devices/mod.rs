@@ -1,7 +1,7 @@
 //! `devices`: lists cameras, their formats and controls.
 
 #[cfg(feature = "camera")]
-mod list;
+pub mod list;
 #[cfg(feature = "camera")]
 mod pipewire_cameras;
 
@@ -9,8 +9,6 @@ use clap::Args;
 
 use crate::error::CliError;
 use crate::options::Global;
-#[cfg(feature = "camera")]
-use bokehcam_live::v4l2::node::Node;
 
 /// List cameras and virtual cameras
 ///
@@ -22,7 +20,6 @@ Examples:
   bokehcam devices
   bokehcam devices --controls brio
   bokehcam devices --json /dev/video0")]
-#[cfg_attr(not(feature = "camera"), allow(dead_code))]
 pub struct DevicesCommand {
     /// One device only: its path, number, by-id name, or a part of its card's name; pipewire:NAME for a PipeWire camera
     #[arg(value_name = "DEVICE")]
@@ -35,13 +32,6 @@ pub struct DevicesCommand {
     json: bool,
 }
 
-/// Formats cameras, and nodes that may be cameras, as the command lists them; without links, whose names contain serial
-/// numbers.
-#[cfg(feature = "camera")]
-pub fn format_devices(nodes: &[Node]) -> String {
-    list::format_devices(nodes)
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -50,8 +40,5 @@ pub fn run(command: &DevicesCommand, global: &Global) -> Result<(), CliError> {
     #[cfg(feature = "camera")]
     return list::run(command, global);
     #[cfg(not(feature = "camera"))]
-    {
-        let _ = (command, global);
-        Err(CliError::NoCameras)
-    }
+    return Err(CliError::NoCameras);
 }

@@ -8,7 +8,6 @@ use bokehcam::computing::ComputeOptions;
 use bokehcam::look::{Effect, Look};
 
 const BLUR: &str = "blur";
-#[cfg(feature = "networks")]
 const NETWORKS: &str = "networks";
 const PROGRAMS: &str = "programs";
 

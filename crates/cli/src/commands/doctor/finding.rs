@@ -41,3 +41,12 @@ impl Finding {
         Self { about, level: Level::Missing, found: found.into(), fix: Some(fix.into()) }
     }
 }
+
+/// Results of the PipeWire checks.
+pub struct PipeWireResults {
+    pub findings: Vec<Finding>,
+    /// Whether this program can publish a camera that others can read.
+    pub can_publish: bool,
+    /// The cameras to read from, by the names that people see.
+    pub cameras: Vec<String>,
+}

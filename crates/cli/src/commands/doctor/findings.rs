@@ -5,11 +5,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::finding::{Finding, Level};
-#[cfg(feature = "pipewire")]
-use super::pipewire_camera::{self, PipeWireResults};
+use super::finding::{Finding, Level, PipeWireResults};
 use super::system::System;
-use super::{CliError, cameras, computing, loopback, settings};
+use super::{CliError, cameras, computing, loopback, pipewire_camera, settings};
 use crate::terminal::print_to_stdout;
 use bokehcam_live::v4l2::node::{Node, list_nodes};
 
@@ -35,17 +33,7 @@ impl CheckResults {
         let nodes = list_nodes();
         let mut findings = cameras::check_cameras(&nodes, &system);
         findings.extend(loopback::check_loopback(&nodes, &system));
-        #[cfg(feature = "pipewire")]
-        {
-            let verdict = pipewire_camera::check_pipewire(&system);
-            findings = add_pipewire(findings, verdict, &system);
-        }
-        #[cfg(not(feature = "pipewire"))]
-        findings.push(Finding::note(
-            "PipeWire",
-            "this program was built without it",
-            "build it with the feature pipewire",
-        ));
+        let mut findings = add_pipewire(findings, pipewire_camera::check_pipewire(&system), &system);
         findings.extend(computing::check_computing());
         findings.extend(settings::check_settings(config));
         Self { system, nodes, findings }
@@ -64,7 +52,6 @@ impl CheckResults {
 }
 
 /// Adds the results of PipeWire to findings about devices: one kind of camera is enough, and one kind of virtual camera.
-#[cfg(feature = "pipewire")]
 fn add_pipewire(mut findings: Vec<Finding>, verdict: PipeWireResults, system: &System) -> Vec<Finding> {
     let PipeWireResults { findings: others, can_publish, cameras } = verdict;
     let has_cameras = !cameras.is_empty();
@@ -119,7 +106,7 @@ fn format_findings(findings: &[Finding]) -> String {
     out
 }
 
-#[cfg(all(test, feature = "pipewire"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -50,15 +50,9 @@ fn list_graphics_cards(class: &Path) -> Vec<String> {
     names.iter().filter_map(card).collect()
 }
 
-#[cfg(feature = "gpu")]
 fn list_vulkan_adapters() -> Vec<String> {
     let adapters = bokehcam::compute::device::list_adapters();
     if adapters.is_empty() { vec!["no adapter, or no loader (libvulkan.so.1)".to_owned()] } else { adapters }
-}
-
-#[cfg(not(feature = "gpu"))]
-fn list_vulkan_adapters() -> Vec<String> {
-    vec!["this program was built without it".to_owned()]
 }
 
 #[cfg(test)]

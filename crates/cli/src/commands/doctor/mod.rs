@@ -2,25 +2,19 @@
 
 #[cfg(feature = "camera")]
 mod cameras;
-#[cfg(feature = "camera")]
 mod computing;
-#[cfg(feature = "camera")]
 mod finding;
 #[cfg(feature = "camera")]
 mod findings;
-#[cfg(feature = "camera")]
 mod hardware;
 #[cfg(feature = "camera")]
 mod loopback;
-#[cfg(all(feature = "camera", feature = "pipewire"))]
+#[cfg_attr(not(feature = "pipewire"), path = "no_pipewire_camera.rs")]
 mod pipewire_camera;
-#[cfg(feature = "camera")]
 mod private;
 #[cfg(feature = "camera")]
 mod report;
-#[cfg(feature = "camera")]
 mod settings;
-#[cfg(feature = "camera")]
 mod system;
 
 use std::path::PathBuf;
@@ -41,7 +35,6 @@ Examples:
   bokehcam doctor
   bokehcam doctor --json > doctor.json
   bokehcam doctor --report machine.md")]
-#[cfg_attr(not(feature = "camera"), allow(dead_code))]
 pub struct DoctorCommand {
     /// As JSON
     #[arg(long)]
@@ -57,15 +50,11 @@ pub struct DoctorCommand {
 /// # Errors
 /// Fails if something essential is missing, or this program was built without cameras.
 pub fn run(command: &DoctorCommand, global: &Global) -> Result<(), CliError> {
-    let config = global.config.as_deref();
     #[cfg(feature = "camera")]
-    match &command.report {
-        Some(file) => report::run(file.as_deref(), config),
-        None => findings::run(command.json, config),
-    }
+    return match (&command.report, global.config.as_deref()) {
+        (Some(file), config) => report::run(file.as_deref(), config),
+        (None, config) => findings::run(command.json, config),
+    };
     #[cfg(not(feature = "camera"))]
-    {
-        let _ = (command, config);
-        Err(CliError::NoCameras)
-    }
+    return Err(CliError::NoCameras);
 }

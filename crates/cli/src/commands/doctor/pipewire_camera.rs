@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use super::finding::Finding;
+use super::finding::{Finding, PipeWireResults};
 use super::system::System;
 use bokehcam_live::pipewire::PipeWireError;
 use bokehcam_live::pipewire::graph::Graph;
@@ -21,15 +21,6 @@ const BROWSERS: [(&[&str], &str, &str); 2] = [
     ),
     (&["firefox", "firefox-esr"], "Firefox", "about:config, media.webrtc.camera.allow-pipewire = true"),
 ];
-
-/// Results of the PipeWire checks.
-pub struct PipeWireResults {
-    pub findings: Vec<Finding>,
-    /// Whether this program can publish a camera that others can read.
-    pub can_publish: bool,
-    /// The cameras to read from, by the names that people see.
-    pub cameras: Vec<String>,
-}
 
 /// Checks the requirements of a PipeWire camera, from the daemon to the browsers.
 pub fn check_pipewire(system: &System) -> PipeWireResults {

@@ -34,7 +34,7 @@ pub fn run(file: Option<&Path>, config: Option<&Path>) -> Result<(), CliError> {
         "Machine",
         &(examined.system.to_string() + "\n" + &hardware::describe_hardware().join("\n")),
     );
-    add_section(&mut facts, "Cameras", &devices::format_devices(&examined.nodes));
+    add_section(&mut facts, "Cameras", &devices::list::format_devices(&examined.nodes));
     add_section(&mut facts, "What doctor found", &examined.format_text());
     add_section(&mut facts, "Time of the blur", &bench::run_short_benchmark());
     let report = FORM.to_owned() + &Redactor::detect().redact(&facts);

@@ -10,7 +10,8 @@ use clap::Args;
 
 use crate::controlled;
 use crate::error::CliError;
-use crate::options::{Global, Streaming, Window};
+use crate::options::window::Window;
+use crate::options::{Global, Streaming};
 use crate::report;
 use crate::settings::file;
 use crate::settings::layers::GivenSettings;
@@ -135,7 +136,8 @@ pub fn show_source(
         saved_state_file,
         control,
         stop: terminal::stop_flag()?,
-    })?;
+    })
+    .map_err(|error| CliError::Part(error.into()))?;
     conclude(outcome, close_at_end, stream.report.as_deref(), (output.force, global))
 }
 

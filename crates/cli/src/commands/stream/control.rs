@@ -15,9 +15,7 @@ use bokehcam::clock::Clock;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Change, Look, LookFacts, Patch};
-#[cfg(feature = "desktop")]
-use bokehcam_live::control::bus;
-use bokehcam_live::control::{Answer, Claim, Server, Status};
+use bokehcam_live::control::{Answer, Claim, Server, Status, bus};
 use bokehcam_live::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
 use bokehcam_live::pipeline::{ChangeSender, Progress};
 use bokehcam_live::sink::ShutterControl;
@@ -39,7 +37,6 @@ pub(super) struct LookChanger {
 /// Control server of a stream; stops when dropped.
 pub(super) struct ControlServer {
     /// Dropped first, so that no further bus calls arrive.
-    #[cfg(feature = "desktop")]
     bus: Option<bus::Bus>,
     server: Option<Server>,
     /// Thread that creates executors, which is too slow for an answer.
@@ -48,7 +45,6 @@ pub(super) struct ControlServer {
 
 impl Drop for ControlServer {
     fn drop(&mut self) {
-        #[cfg(feature = "desktop")]
         drop(self.bus.take());
         // Dropping the server drops the sender that the thread waits for.
         drop(self.server.take());
@@ -130,7 +126,6 @@ pub(super) fn serve(
     // The bus wraps the handler, so it has to start before the socket's server.
     let handler =
         Controller::create_handler(claim.name().clone(), "stream", command_line, Stream { run, look, new_looks });
-    #[cfg(feature = "desktop")]
     let (bus, handler) = match tray.map(|presets| bus::serve(Arc::clone(&handler), presets)) {
         Some(Ok((bus, handler))) => (Some(bus), handler),
         Some(Err(why)) => {
@@ -139,17 +134,8 @@ pub(super) fn serve(
         }
         None => (None, handler),
     };
-    #[cfg(not(feature = "desktop"))]
-    if tray.is_some() {
-        tracing::warn!("--tray: this program was built without it; build it with the feature desktop");
-    }
     let server = claim.serve(handler).map_err(no_thread)?;
-    Ok(ControlServer {
-        #[cfg(feature = "desktop")]
-        bus,
-        server: Some(server),
-        looks: Some(looks),
-    })
+    Ok(ControlServer { bus, server: Some(server), looks: Some(looks) })
 }
 
 /// Applies requested looks until all senders are gone.

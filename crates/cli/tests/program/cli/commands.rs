@@ -135,13 +135,6 @@ fn y4m_on_standard_output_is_nothing_but_y4m() {
 }
 
 #[test]
-#[cfg(feature = "camera")]
-fn a_virtual_camera_that_is_not_there_is_refused_with_the_way_to_make_one() {
-    let refused = run(&["stream", "synthetic", "--size", "64x48", "--frames", "1", "--to", "/dev/video199"]);
-    refused.refused(1, &["sudo modprobe v4l2loopback devices=1 video_nr=199"]);
-}
-
-#[test]
 fn one_stream_goes_to_several_sinks() {
     let home = Home::new();
     let args = ["stream", "synthetic", "--size", "16x12", "--frames", "2", "--effect", "none", "--quiet", "--to", "-"];
@@ -200,63 +193,6 @@ fn the_aperture_analysis_is_whole_and_is_not_overwritten_unasked() {
     home.run(&[&args[..], &["--force"]].concat()).done();
     assert_ne!(fs::read(out.join("disc.png")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(&out).unwrap().count(), 4, "no leftovers");
-}
-
-#[cfg(feature = "camera")]
-#[test]
-fn devices_are_listed_or_the_way_to_help_is_named() {
-    let (text, json) = (run(&["devices"]), run(&["devices", "--json", "--controls"]));
-    assert_eq!((text.code, json.code, json.stderr.as_str()), (0, 0, ""), "{}", text.stderr);
-    let list = json.json();
-    let told: Vec<_> =
-        ["cameras", "virtual_cameras"].iter().flat_map(|group| list[group].as_array().unwrap()).collect();
-    for device in &told {
-        let path = device["path"].as_str().unwrap();
-        assert!(path.starts_with("/dev/") && text.stdout.contains(path), "{device}");
-        assert!(device["formats"].is_array() && device["controls"].is_array(), "{device}");
-    }
-    if told.is_empty() && list["pipewire"].is_null() {
-        assert_eq!((text.stdout.as_str(), text.stderr.lines().count()), ("", 1));
-        assert!(text.stderr.contains("bokehcam doctor"), "{}", text.stderr);
-    }
-}
-
-#[cfg(feature = "camera")]
-#[test]
-fn a_device_that_is_not_there_costs_one_line() {
-    for (name, said) in [
-        ("no camera has this name", "there is no camera 'no camera has this name'"),
-        ("/dev/video4711", "there is no camera '/dev/video4711'"),
-        ("/dev/null", "not a video device"),
-        ("/etc/hostname", "not a device node"),
-    ] {
-        run(&["devices", name]).refused(1, &[said]);
-    }
-}
-
-#[cfg(feature = "camera")]
-#[test]
-fn the_doctor_has_a_fix_for_what_is_not_good() {
-    // One home: the folder for sockets is part of what is found.
-    let home = Home::new();
-    let (text, json) = (home.run(&["doctor"]), home.run(&["doctor", "--json"]));
-    let told = json.json();
-    let findings = told["findings"].as_array().unwrap();
-    for about in ["camera", "virtual camera", "blur", "programs"] {
-        assert!(findings.iter().any(|finding| finding["about"] == about), "{about}: {told}");
-    }
-    for finding in findings {
-        assert_eq!(finding["level"] == "good", finding["fix"].is_null(), "{finding}");
-        assert!(text.stdout.contains(finding["found"].as_str().unwrap()), "{finding}: {}", text.stdout);
-    }
-    let missing = |about| findings.iter().any(|finding| finding["about"] == about && finding["level"] == "missing");
-    let ready = !missing("camera") && !missing("virtual camera");
-    assert_eq!(told["ready"], ready);
-    for ran in [&text, &json] {
-        assert_eq!((ran.code, ran.stderr.lines().count()), if ready { (0, 0) } else { (1, 1) }, "{}", ran.stderr);
-    }
-    let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
-    assert!(text.stdout.lines().next().unwrap().contains(kernel.trim()), "{}", text.stdout);
 }
 
 #[cfg(not(feature = "camera"))]

@@ -80,7 +80,6 @@ fn recordings_say_what_they_have_no_use_for() {
 }
 
 #[test]
-#[cfg(feature = "camera")]
 fn a_recording_is_no_camera() {
     let home = Home::new().with_recording();
     let args = ["stream", "recording", "--to", "null", "--control", "gain=1", "--format", "MJPG", "--effect", "none"];

@@ -111,6 +111,12 @@ fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<ReaderW
     Ok(ReaderWatcher::start((monitor, stop), demand).map_err(system_error)?)
 }
 
+impl From<LoopbackError> for SinkError {
+    fn from(error: LoopbackError) -> Self {
+        Self::Camera(error.into())
+    }
+}
+
 impl Sink for Loopback {
     fn write_frame(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.encoder.encode(self.fit.fit_if_needed(frame, &mut self.fitted), &mut self.bytes);

@@ -8,10 +8,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-#[cfg(feature = "networks")]
 use bokehcam::names;
-#[cfg(feature = "networks")]
-use bokehcam_media::network::Scaling;
 
 /// Networks that make depth from the pictures of one camera.
 #[derive(Clone, Debug, Default, Args)]
@@ -19,16 +16,13 @@ use bokehcam_media::network::Scaling;
 pub struct Networks {
     /// Input range of an unknown network, from black to white: unit (0 to 1), signed (-1 to 1), codes (0 to 255) or
     /// imagenet (normalized by the mean and deviation of ImageNet) [default: unit for a matte, imagenet for depth]
-    #[cfg(feature = "networks")]
     #[arg(long, value_name = "RANGE", value_parser = names::parse_name::<Range>)]
     pub network_range: Option<Range>,
     /// Order of the colours in the input of an unknown network: rgb or bgr [default: rgb]
-    #[cfg(feature = "networks")]
     #[arg(long, value_name = "ORDER", value_parser = names::parse_name::<Order>)]
     pub network_order: Option<Order>,
 }
 
-#[cfg(feature = "networks")]
 names::named! {
     /// Input range of a network, from black to white.
     pub enum Range default Unit {
@@ -43,20 +37,6 @@ names::named! {
     }
 }
 
-#[cfg(feature = "networks")]
-impl Range {
-    /// Returns the scaling of a picture's codes.
-    pub fn scaling(self) -> Scaling {
-        match self {
-            Self::Unit => Scaling::UNIT,
-            Self::Signed => Scaling::SIGNED,
-            Self::Codes => Scaling::CODES,
-            Self::Imagenet => Scaling::IMAGENET,
-        }
-    }
-}
-
-#[cfg(feature = "networks")]
 names::named! {
     /// The order of a picture's colours.
     pub enum Order default Rgb {
@@ -206,23 +186,5 @@ mod tests {
         assert!(
             depth("matte:").unwrap_err().contains("name a file") && depth("mono,mono").unwrap_err().contains("twice")
         );
-    }
-
-    #[cfg(feature = "networks")]
-    #[test]
-    fn a_range_is_what_black_and_white_become() {
-        for (range, black, white) in [
-            (Range::Unit, 0.0, 1.0),
-            (Range::Signed, -1.0, 1.0),
-            (Range::Codes, 0.0, 255.0),
-            // For red: (0 - 0.485) / 0.229 and (1 - 0.485) / 0.229.
-            (Range::Imagenet, -2.117_904, 2.248_908),
-        ] {
-            let Scaling { mean, divisor } = range.scaling();
-            for (code, expected) in [(0.0, black), (255.0, white)] {
-                let became: f32 = (code - mean[0]) / divisor[0];
-                assert!((became - expected).abs() < 1e-4, "{}: {code} became {became}", range.name());
-            }
-        }
     }
 }
