@@ -2,7 +2,7 @@
 
 #![allow(missing_docs)]
 // What only a feature needs is no reason for attributes of its own.
-#![cfg_attr(not(feature = "packaged"), allow(dead_code, unused_imports))]
+#![cfg_attr(not(feature = "packaged"), allow(dead_code, unused_imports, unused_variables))]
 
 mod commands;
 mod controlled;

@@ -38,10 +38,9 @@ mod suggestion;
 pub mod video;
 
 pub use error::SourceError;
-pub use installed::find_each_best as installed_networks;
 pub use look_files::register_look_files;
 pub use name::{Kind, SourceName};
-pub use networks::find_person;
+pub use networks::{find_person, installed_networks};
 use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, Orientation, PlateFile, SingleCameraDepth, Size};
 use orientation::SourceTransform;

@@ -1,6 +1,6 @@
 //! Depth from a single camera by networks, either named by the user or installed.
 
-use super::installed::find_each_best;
+pub use super::installed::find_each_best as installed_networks;
 pub(super) use super::installed::open_networks;
 use super::{DepthChoice, DepthOrigin, OpenRequest, Options, SingleCameraDepth, Source};
 use bokehcam::depth::focus::{FocusRule, PersonDistance, PersonFocus};
@@ -20,7 +20,7 @@ pub(super) fn add_network_depth(source: Source, request: &OpenRequest) -> Source
     if !is_lone || needs_metres || !request.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;
     }
-    let chosen = find_each_best();
+    let chosen = installed_networks();
     if chosen.matte.is_none() {
         return source;
     }
@@ -39,7 +39,7 @@ pub(super) fn add_network_depth(source: Source, request: &OpenRequest) -> Source
 
 /// Opens the network that detects the person in focus, with a short description; `None` if none is installed.
 fn open_person_detector(request: &OpenRequest) -> Option<(PersonDistance, String)> {
-    let detector = SingleCameraDepth { mono: None, ..find_each_best() };
+    let detector = SingleCameraDepth { mono: None, ..installed_networks() };
     detector.matte.as_ref()?;
     let opened = open_networks(&detector, request);
     let logged = opened.inspect_err(|error| tracing::warn!("{error}; the focus uses distances only"));
