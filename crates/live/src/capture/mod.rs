@@ -40,33 +40,40 @@ pub trait Camera: Send {
     /// The camera failed, and will deliver no more frames.
     fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError>;
 
+    /// Returns the camera whose frames this one changes, if it does: the methods below are then those of that camera.
+    fn inner(&mut self) -> Option<&mut dyn Camera> {
+        None
+    }
+
     /// Skips the frames before media time `until_ns` without reading them; returns how many were skipped. Live cameras
     /// (see [`SourceInfo::live`]) cannot skip and return 0.
     fn skip_until(&mut self, until_ns: u64) -> u64 {
-        let _ = until_ns;
-        0
+        self.inner().map_or(0, |inner| inner.skip_until(until_ns))
     }
 
     /// Returns how long the last call of [`Camera::next`] waited for the frame, in nanoseconds.
-    fn waited_ns(&self) -> u64 {
-        0
+    fn waited_ns(&mut self) -> u64 {
+        self.inner().map_or(0, |inner| inner.waited_ns())
     }
 
     /// Returns the handle that requests frames by position, if the camera can seek.
-    fn seeker(&self) -> Option<Arc<Seeker>> {
-        None
+    fn seeker(&mut self) -> Option<Arc<Seeker>> {
+        self.inner()?.seeker()
     }
 
     /// Seeks to a frame, by its position in the [seeker](Camera::seeker): it is read next, and media time continues as
     /// if it followed the previous frame. Returns how far, in nanoseconds, the source's own time is then ahead of media
     /// time.
     fn seek(&mut self, position: usize) -> i64 {
-        let _ = position;
-        0
+        self.inner().map_or(0, |inner| inner.seek(position))
     }
 
     /// Releases the device, if there is one, until [`Camera::next`] is called again: no client watches.
-    fn suspend(&mut self) {}
+    fn suspend(&mut self) {
+        if let Some(inner) = self.inner() {
+            inner.suspend();
+        }
+    }
 }
 
 /// Buffers for a frame. Those that the camera does not deliver stay unchanged.

@@ -116,7 +116,7 @@ impl Camera for PipeWireCamera {
         Ok(Captured::Frame(Stamp { index, time_ns, captured_ns: Some(captured_ns) }))
     }
 
-    fn waited_ns(&self) -> u64 {
+    fn waited_ns(&mut self) -> u64 {
         self.waited_ns
     }
 

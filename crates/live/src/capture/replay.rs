@@ -168,7 +168,7 @@ impl Camera for Replay {
         self.delivered - from
     }
 
-    fn seeker(&self) -> Option<Arc<Seeker>> {
+    fn seeker(&mut self) -> Option<Arc<Seeker>> {
         Some(Arc::clone(&self.seeker))
     }
 

@@ -1,8 +1,6 @@
 //! A stereo camera that delivers both views side by side in one picture.
 
-use std::sync::Arc;
-
-use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, Seeker, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, SourceInfo};
 use bokehcam::frame::{ColorImage, compute_luma};
 
 /// Splits the pictures of another camera: the left half is the left view, the right half the right view.
@@ -54,24 +52,8 @@ impl Camera for SideBySide {
         Ok(captured)
     }
 
-    fn skip_until(&mut self, until_ns: u64) -> u64 {
-        self.camera.skip_until(until_ns)
-    }
-
-    fn waited_ns(&self) -> u64 {
-        self.camera.waited_ns()
-    }
-
-    fn seeker(&self) -> Option<Arc<Seeker>> {
-        self.camera.seeker()
-    }
-
-    fn seek(&mut self, position: usize) -> i64 {
-        self.camera.seek(position)
-    }
-
-    fn suspend(&mut self) {
-        self.camera.suspend();
+    fn inner(&mut self) -> Option<&mut dyn Camera> {
+        Some(&mut *self.camera)
     }
 }
 

@@ -1,8 +1,6 @@
 //! A camera whose pictures are turned, flipped and cut as they come.
 
-use std::sync::Arc;
-
-use super::{Camera, CaptureError, Captured, FrameBuffers, Seeker, SourceInfo};
+use super::{Camera, CaptureError, Captured, FrameBuffers, SourceInfo};
 use bokehcam::frame::transform::Transform;
 use bokehcam::frame::{ColorImage, DepthMap};
 
@@ -59,24 +57,8 @@ impl Camera for TransformedCamera {
         Ok(captured)
     }
 
-    fn skip_until(&mut self, until_ns: u64) -> u64 {
-        self.camera.skip_until(until_ns)
-    }
-
-    fn waited_ns(&self) -> u64 {
-        self.camera.waited_ns()
-    }
-
-    fn seeker(&self) -> Option<Arc<Seeker>> {
-        self.camera.seeker()
-    }
-
-    fn seek(&mut self, position: usize) -> i64 {
-        self.camera.seek(position)
-    }
-
-    fn suspend(&mut self) {
-        self.camera.suspend();
+    fn inner(&mut self) -> Option<&mut dyn Camera> {
+        Some(&mut *self.camera)
     }
 }
 

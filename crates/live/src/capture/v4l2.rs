@@ -158,7 +158,7 @@ impl Camera for V4l2Camera {
         Ok(self.next_within(MAX_WAIT, buffers.color))
     }
 
-    fn waited_ns(&self) -> u64 {
+    fn waited_ns(&mut self) -> u64 {
         self.waited_ns
     }
 

@@ -244,7 +244,7 @@ impl Camera for Video {
         self.delivered - from
     }
 
-    fn seeker(&self) -> Option<Arc<Seeker>> {
+    fn seeker(&mut self) -> Option<Arc<Seeker>> {
         self.seeker.clone()
     }
 

@@ -69,7 +69,7 @@ impl Camera for Lockstep {
         Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns }))
     }
 
-    fn waited_ns(&self) -> u64 {
+    fn waited_ns(&mut self) -> u64 {
         self.waited_ns
     }
 }

@@ -143,7 +143,7 @@ impl DepthSource for Told {
 fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), true);
-    let camera = looped(folder.path(), 0.0);
+    let mut camera = looped(folder.path(), 0.0);
     let seeker = camera.seeker().unwrap();
     let jumps = Arc::default();
     let depth = Told(RecordedDepth::new(open(folder.path()), "test").unwrap(), Arc::clone(&jumps));

@@ -43,7 +43,7 @@ impl PipelineRun {
         outputs: &mut Outputs,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let OpenedSource { name, source, has_depth, depth_methods, depth_method, camera, .. } = opened;
+        let OpenedSource { name, mut source, has_depth, depth_methods, depth_method, camera, .. } = opened;
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());

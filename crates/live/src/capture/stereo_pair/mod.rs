@@ -168,7 +168,7 @@ impl<E: PairedCamera> Camera for StereoPair<E> {
         })
     }
 
-    fn waited_ns(&self) -> u64 {
+    fn waited_ns(&mut self) -> u64 {
         self.waited_ns
     }
 
