@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
@@ -19,7 +19,7 @@ use bokehcam::depth::plate::{Capture, CaptureResult, Step};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::look::{Effect, Look};
-use bokehcam_live::capture::{Camera, Captured, FrameBuffers};
+use bokehcam_live::capture::{Camera, FrameBuffers};
 use bokehcam_live::source::{DepthChoice, Kind, Options, Source, SourceName, single_camera};
 use bokehcam_media::recording::still;
 
@@ -98,15 +98,8 @@ impl Frames {
     /// Reads the next frame; returns `None` at the end, or when the user stops.
     fn next(&mut self) -> Result<Option<Stamp>, CliError> {
         let (mut depth, mut right) = (DepthMap::default(), GrayImage::default());
-        while !self.stop.load(Ordering::Relaxed) {
-            match self.camera.next(FrameBuffers { color: &mut self.color, depth: &mut depth, right: &mut right })? {
-                Captured::Frame(stamp) => return Ok(Some(stamp)),
-                Captured::Corrupt(error) => return Err(error.into()),
-                Captured::Lost(..) | Captured::Waiting => {}
-                Captured::End => break,
-            }
-        }
-        Ok(None)
+        let buffers = FrameBuffers { color: &mut self.color, depth: &mut depth, right: &mut right };
+        Ok(self.camera.wait_for_frame(buffers, &self.stop, &mut 0)?)
     }
 }
 

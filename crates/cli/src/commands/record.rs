@@ -14,7 +14,7 @@ use crate::terminal;
 use bokehcam::depth::FrameInput;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::look::{Effect, Look};
-use bokehcam_live::capture::{Captured, FrameBuffers, FrameData};
+use bokehcam_live::capture::{FrameBuffers, FrameData};
 use bokehcam_live::source::{Options, Source, SourceName};
 use bokehcam_media::recording::RecordingWriter;
 use bokehcam_media::recording::tum::RecordingSummary;
@@ -143,17 +143,9 @@ fn record_frames(
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-    while !stop.load(Ordering::Relaxed) {
-        let stamp = match camera.next(FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right })? {
-            Captured::Frame(stamp) => stamp,
-            Captured::Corrupt(error) => return Err(error.into()),
-            Captured::Lost(count, _) => {
-                *lost += count;
-                continue;
-            }
-            Captured::Waiting => continue,
-            Captured::End => return Ok(true),
-        };
+    loop {
+        let buffers = FrameBuffers { color: &mut color, depth: &mut depth, right: &mut right };
+        let Some(stamp) = camera.wait_for_frame(buffers, &stop, lost)? else { break };
         if let Some(source) = source {
             source.rectify(&mut color);
             let right = (info.frame_data == FrameData::RightCamera).then_some(&right);
@@ -164,7 +156,7 @@ fn record_frames(
         progress.set_delivered(writer.frames() as u64);
     }
     // A camera is endless: stopping it is its regular end.
-    Ok(info.live || info.frames.is_none())
+    Ok(!stop.load(Ordering::Relaxed) || info.live || info.frames.is_none())
 }
 
 /// Keeps the frames of an interrupted recording, and reports where.

@@ -19,6 +19,7 @@ pub mod video;
 pub mod y4m;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub use error::CaptureError;
@@ -73,6 +74,31 @@ pub trait Camera: Send {
         if let Some(inner) = self.inner() {
             inner.suspend();
         }
+    }
+}
+
+impl dyn Camera {
+    /// Reads frames until one is there, and adds the number of those `lost` in between. Returns `None` at the end, or
+    /// when the user stops.
+    ///
+    /// # Errors
+    /// The camera failed, or the frame cannot be decoded.
+    pub fn wait_for_frame(
+        &mut self,
+        FrameBuffers { color, depth, right }: FrameBuffers,
+        stop: &AtomicBool,
+        lost: &mut u64,
+    ) -> Result<Option<Stamp>, CaptureError> {
+        while !stop.load(Ordering::Relaxed) {
+            match self.next(FrameBuffers { color: &mut *color, depth: &mut *depth, right: &mut *right })? {
+                Captured::Frame(stamp) => return Ok(Some(stamp)),
+                Captured::Corrupt(error) => return Err(error),
+                Captured::Lost(count, _) => *lost += count,
+                Captured::Waiting => {}
+                Captured::End => break,
+            }
+        }
+        Ok(None)
     }
 }
 
