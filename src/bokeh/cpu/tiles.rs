@@ -1,5 +1,7 @@
 //! Tile classification before any colour is read: the CoC range of every tile, and the tiles that stay unchanged.
 
+use std::ops::Range;
+
 use super::pixels::Radii;
 use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::plan::BinWeight;
@@ -67,33 +69,22 @@ impl Tiles {
     }
 
     /// Whether the weight is below 1 at the lowest CoC of any of these tiles.
-    pub fn any_partly_outside(
-        &self,
-        weight: &BinWeight,
-        columns: std::ops::Range<usize>,
-        rows: std::ops::Range<usize>,
-    ) -> bool {
-        let columns = columns.start.min(self.across)..columns.end.min(self.across);
-        (rows.start..rows.end.min(self.down)).any(|row| {
-            let at = row * self.across;
-            self.ranges[at + columns.start..at + columns.end].iter().any(|range| weight.at(range.0) < 1.0)
+    pub fn any_partly_outside(&self, weight: &BinWeight, columns: Range<usize>, rows: Range<usize>) -> bool {
+        self.spans(columns, rows).any(|span| self.ranges[span].iter().any(|range| weight.at(range.0) < 1.0))
+    }
+
+    /// Whether the weight is above 0 for any CoC of these tiles.
+    pub fn any_overlapping(&self, weight: &BinWeight, columns: Range<usize>, rows: Range<usize>) -> bool {
+        self.spans(columns, rows).any(|span| {
+            let mut tiles = self.ranges[span.clone()].iter().zip(&self.idle[span]);
+            tiles.any(|(&range, &idle)| !idle && weight.overlaps(range))
         })
     }
 
-    /// Whether the weight is above 0 for any CoC of these tiles; their columns and rows are clamped to the picture.
-    pub fn any_overlapping(
-        &self,
-        weight: &BinWeight,
-        columns: std::ops::Range<usize>,
-        rows: std::ops::Range<usize>,
-    ) -> bool {
-        let columns = columns.start.min(self.across)..columns.end.min(self.across);
-        (rows.start..rows.end.min(self.down)).any(|row| {
-            let at = row * self.across;
-            let tiles = &self.ranges[at + columns.start..at + columns.end];
-            let idle = &self.idle[at + columns.start..at + columns.end];
-            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && weight.overlaps(range))
-        })
+    /// Returns where these tiles are, row by row; columns and rows are clamped to the picture.
+    fn spans(&self, columns: Range<usize>, rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+        let (across, [first, last]) = (self.across, [columns.start, columns.end].map(|column| column.min(self.across)));
+        (rows.start..rows.end.min(self.down)).map(move |row| row * across + first..row * across + last)
     }
 }
 
