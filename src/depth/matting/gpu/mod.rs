@@ -66,11 +66,8 @@ impl GpuMatting {
 
     /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.resources
-            .as_ref()
-            .and_then(|resources| resources.timestamps.as_ref())
-            .map(Timestamps::last_times)
-            .unwrap_or_default()
+        let timestamps = self.resources.as_ref().and_then(|resources| resources.timestamps.as_ref());
+        timestamps.map(Timestamps::last_times).unwrap_or_default()
     }
 
     /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_with_background`] does.

@@ -82,11 +82,8 @@ impl GpuRefiner {
 
     /// Returns the time of each pass over the last frame; empty if the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.resources
-            .as_ref()
-            .and_then(|resources| resources.timestamps.as_ref())
-            .map(Timestamps::last_times)
-            .unwrap_or_default()
+        let timestamps = self.resources.as_ref().and_then(|resources| resources.timestamps.as_ref());
+        timestamps.map(Timestamps::last_times).unwrap_or_default()
     }
 
     /// Returns the last refined map and its picture on the device, if they are there; valid until the next frame.
