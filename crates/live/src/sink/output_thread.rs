@@ -11,6 +11,7 @@ use std::{io, mem};
 
 use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
 use crate::stats::{NodeCounts, OutputCounts};
+use bokehcam::compute::panic_message;
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::fit::Letterbox;
 use bokehcam::link::{self, Abandoned, Received, Sender, Sent};
@@ -109,8 +110,7 @@ impl OutputThread {
             // A panic is an error of this output only.
             let ended = catch_unwind(AssertUnwindSafe(|| serve_sink(sink, receiver, fit, &thread_shared)));
             let outcome = ended.unwrap_or_else(|panic| {
-                let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-                Outcome::Failed(SinkError::Panic { sink: sink_name, what: text.unwrap_or("no reason given").into() })
+                Outcome::Failed(SinkError::Panic { sink: sink_name, what: panic_message(&*panic).into() })
             });
             on_end(thread_shared.frames.load(Ordering::Relaxed), &outcome);
             // The receiver may be gone.

@@ -21,6 +21,7 @@ pub use saved_state::{SavedState, WindowSize};
 use super::session;
 use super::state::State;
 use bokehcam::compute::device::Device;
+use bokehcam::compute::panic_message;
 use bokehcam_live::control::Claim;
 use bokehcam_live::controller::CommandLine;
 use bokehcam_live::stats::Report;
@@ -146,9 +147,6 @@ fn create_event_loop() -> Result<EventLoop<UserEvent>, WindowError> {
     match made {
         Ok(Ok(events)) => Ok(events),
         Ok(Err(error)) => Err(WindowError::NoWindow(strip_source_location(&error))),
-        Err(panic) => {
-            let why = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-            Err(WindowError::NoWindow(why.unwrap_or("a library is missing").to_owned()))
-        }
+        Err(panic) => Err(WindowError::NoWindow(panic_message(&*panic).to_owned())),
     }
 }
