@@ -23,7 +23,6 @@ use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
 use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, compensated_radius_px, scale_within};
-use super::reuse::{MIN_KEPT_RADIUS_PX, is_kept};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -52,6 +51,10 @@ pub const UNBOUNDED_COLOR: f32 = 1e20;
 /// finds content.
 pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
+/// The result of a bin whose content has at least this radius, in pixels, may be reused; below, it follows details that
+/// the means of tiles do not show.
+pub const MIN_KEPT_RADIUS_PX: f32 = 5.0;
+
 /// A range of signed CoC, with the scale of its picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
@@ -77,6 +80,11 @@ impl Bin {
     /// Returns the standard deviation, in cells, of the neighbourhood over which a local radius is averaged.
     pub fn sigma_cells(&self) -> f32 {
         (self.max_radius_px / (2.0 * CELL as f32)).max(0.5)
+    }
+
+    /// Whether its result may be reused. Near objects move most, and are few.
+    pub fn is_kept(&self) -> bool {
+        !self.near && self.min_radius_px >= MIN_KEPT_RADIUS_PX
     }
 }
 
@@ -279,7 +287,7 @@ impl Plan {
 
     /// Returns which bins' results may be kept from frame to frame.
     pub fn kept_bins(&self) -> [bool; MAX_BINS] {
-        std::array::from_fn(|k| self.bins.get(k).is_some_and(is_kept))
+        std::array::from_fn(|k| self.bins.get(k).is_some_and(Bin::is_kept))
     }
 
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a

@@ -13,13 +13,10 @@
 
 use std::ops::Range;
 
-use super::plan::{Bin, CELL, Plan};
+use super::plan::{CELL, Plan};
 use super::quality_level::SCALES;
 use crate::frame::change::{Prediction, TILE};
 
-/// Bins whose content has at least this radius, in pixels, are kept; below, a result follows details that the means of
-/// tiles do not show.
-pub const MIN_KEPT_RADIUS_PX: f32 = 5.0;
 /// Columns and rows of the smallest result that is kept, in pixels, unless a coarse bin needs more rows.
 const RESULT_SIZE: (usize, usize) = (64, 16);
 /// Columns of the smallest content that is kept, in pixels, unless a coarse bin needs more.
@@ -146,7 +143,7 @@ impl ChangeDetector {
     /// Finds what must be made anew, after the frame was surveyed; `is_beside_fresh` tells whether content that is never
     /// kept is in or beside some columns and rows with other content. Returns false if everything is made anew.
     pub fn detect(&mut self, plan: &Plan, is_beside_fresh: impl Fn(Range<usize>, Range<usize>) -> bool) -> bool {
-        let kept = || plan.bins.iter().filter(|bin| is_kept(bin));
+        let kept = || plan.bins.iter().filter(|bin| bin.is_kept());
         let least_px = kept().map(|bin| bin.min_radius_px).fold(f32::INFINITY, f32::min);
         let is_other = self.generation.replace(plan.generation) != Some(plan.generation);
         self.prediction.predict(least_px);
@@ -174,7 +171,7 @@ impl ChangeDetector {
         }
         content.for_each_row(|rows, across, units| prediction.hold(rows, across, units));
         prediction.predict_held();
-        let scale = plan.bins.iter().filter(|bin| is_kept(bin)).map(|bin| bin.scale).max().unwrap_or(SCALES[0]);
+        let scale = plan.bins.iter().filter(|bin| bin.is_kept()).map(|bin| bin.scale).max().unwrap_or(SCALES[0]);
         results.reset(plan, (RESULT_SIZE.0, RESULT_SIZE.1.max(CELL * scale)));
         results.for_each_row(|rows, across, units| prediction.find_outdated(rows, across, units));
         results.mark_rows(&renewed);
@@ -206,11 +203,6 @@ impl ChangeDetector {
 pub fn content_size(plan: &Plan) -> (usize, usize) {
     let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1);
     (CONTENT_W.max(CONTENT_BIN_W * coarsest), CELL * coarsest.max(SCALES[2]))
-}
-
-/// Whether the result of a bin may be kept. Near objects move most, and are few.
-pub fn is_kept(bin: &Bin) -> bool {
-    !bin.near && bin.min_radius_px >= MIN_KEPT_RADIUS_PX
 }
 
 #[cfg(test)]

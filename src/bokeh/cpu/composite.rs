@@ -16,7 +16,6 @@ use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{InputFrame, compression_factor, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, Plan};
-use crate::bokeh::reuse::is_kept;
 use crate::color::luminance;
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
@@ -130,7 +129,7 @@ impl<T> Composite<'_, T> {
     /// Whether a bin whose result is never kept shows in a chunk of this row of tiles.
     #[inline(always)]
     fn has_fresh_content(&self, x0: usize) -> bool {
-        let fresh = self.plan.bins.iter().filter(|bin| !is_kept(bin));
+        let fresh = self.plan.bins.iter().filter(|bin| !bin.is_kept());
         fresh.filter(|bin| self.slots[bin.slot].present).any(|bin| {
             let slot = &self.slots[bin.slot];
             let rows = (self.y0 / bin.scale).saturating_sub(1)..((self.y0 + TILE_H) / bin.scale + 1).min(bin.height);

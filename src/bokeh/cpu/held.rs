@@ -12,7 +12,7 @@ use super::unpack::InputFrame;
 use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::Plan;
-use crate::bokeh::reuse::{ChangeDetector, Units, is_kept};
+use crate::bokeh::reuse::{ChangeDetector, Units};
 use crate::compute::thread_pool::DisjointParts;
 use crate::frame::change::TILE;
 use crate::optics::CocField;
@@ -136,7 +136,7 @@ impl CpuBokeh {
     fn has_content(&self, kept: bool, columns: &Range<usize>, rows: &Range<usize>) -> bool {
         let columns = columns.start / TILE_W..columns.end.div_ceil(TILE_W);
         let rows = rows.start / TILE_H..rows.end.div_ceil(TILE_H);
-        let mut bins = self.plan.bins.iter().enumerate().filter(|(_, bin)| is_kept(bin) == kept);
+        let mut bins = self.plan.bins.iter().enumerate().filter(|(_, bin)| bin.is_kept() == kept);
         bins.any(|(k, _)| self.tiles.any_overlapping(&self.plan.bin_weight(k), columns.clone(), rows.clone()))
     }
 

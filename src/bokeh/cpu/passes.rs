@@ -17,7 +17,7 @@ use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MAX_LAYERS;
 use crate::bokeh::plan::MAX_BINS;
-use crate::bokeh::reuse::{Units, content_size, is_kept};
+use crate::bokeh::reuse::{Units, content_size};
 use crate::compute::thread_pool::DisjointParts;
 
 impl CpuBokeh {
@@ -166,7 +166,7 @@ impl CpuBokeh {
             arch.dispatch(Strip {
                 source: strip_part.source,
                 size: (bin.width, bin.height),
-                units: units.filter(|_| is_kept(bin)),
+                units: units.filter(|_| bin.is_kept()),
                 wanted_px: plan.wanted_rows(),
                 scale: bin.scale,
                 cells: strip_part.cells,
