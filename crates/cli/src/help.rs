@@ -50,21 +50,6 @@ const LATER_PAGES: [(&str, &[&str]); 6] = [
 /// Settings without use for a single picture.
 const STREAM_ONLY: [&str; 3] = ["follow", "background-memory", "depth-calibration"];
 
-/// Help of `--depth` for streams.
-pub const DEPTH: &str = "\
-Where depth comes from:
-  auto          the source's own; for a single camera or photo, from an installed network
-  recorded      the source's own
-  stereo        matching of the source's two cameras
-  none          no depth, for effects that need none
-  matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
-  mono[:FILE]   a network that estimates distances; matte,mono is both together
-  plate[:FILE]  a picture of the background without you, taken at the start if there is no FILE
-                (the camera must not move)
-  FOLDER        a recording, whose depth is played in a loop
-  FILE          a video of relative depth, for a video of as many frames (white is near)
-  CAMERA        a depth camera: /dev/videoN, N, or part of its name";
-
 /// Help of `--depth` for a single picture.
 const PICTURE_DEPTH: &str = "\
 Where depth comes from:

@@ -14,7 +14,6 @@ pub use bokehcam_live::source::options::{Depth, Frames, Networks, Orientation, S
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named_value_parser};
 
-use crate::help::DEPTH;
 use bokehcam::compute::Backend;
 use bokehcam::computing;
 use bokehcam::look::Effect;
@@ -22,6 +21,21 @@ use bokehcam::look::number::{parse_positive, parse_switch, whole_number_parser};
 use bokehcam::names;
 use bokehcam_live::pipeline::Pace;
 use bokehcam_live::source::{DepthChoice, Size, SourceName};
+
+/// Help of `--depth` for streams.
+const DEPTH: &str = "\
+Where depth comes from:
+  auto          the source's own; for a single camera or photo, from an installed network
+  recorded      the source's own
+  stereo        matching of the source's two cameras
+  none          no depth, for effects that need none
+  matte[:FILE]  a network that finds the person: FILE.onnx, or the best that is installed
+  mono[:FILE]   a network that estimates distances; matte,mono is both together
+  plate[:FILE]  a picture of the background without you, taken at the start if there is no FILE
+                (the camera must not move)
+  FOLDER        a recording, whose depth is played in a loop
+  FILE          a video of relative depth, for a video of as many frames (white is near)
+  CAMERA        a depth camera: /dev/videoN, N, or part of its name";
 
 names::named! {
     /// How log lines are written.
