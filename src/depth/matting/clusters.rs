@@ -7,9 +7,8 @@
 mod cell;
 mod color_models;
 
-use super::contrast::Contrast;
+use super::contrast::{Color, Contrast};
 use super::linear_light;
-use super::symmetric::{Symmetric, outer_product};
 use crate::depth::bitmap::Bitmap;
 
 pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
@@ -71,35 +70,6 @@ impl Sums {
         for k in 0..self.0.len() {
             self.0[k] += weight * other.0[k];
         }
-    }
-}
-
-/// Mean and covariance of a surface's colours in linear light.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Color {
-    pub mean: [f32; 3],
-    pub covariance: Symmetric,
-}
-
-impl Color {
-    /// Computes mean and covariance from the total weight, and the weighted sums of the light and of its products.
-    #[inline(always)]
-    pub(super) fn from_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
-        let mean = light.map(|light| light / weight);
-        let of_mean = outer_product(mean);
-        Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
-    }
-
-    /// Adds another colour times a weight.
-    #[inline(always)]
-    pub(super) fn add(&mut self, weight: f32, other: &Self) {
-        self.mean.iter_mut().zip(other.mean).for_each(|(sum, value)| *sum += weight * value);
-        self.covariance.iter_mut().zip(other.covariance).for_each(|(sum, value)| *sum += weight * value);
-    }
-
-    #[inline(always)]
-    pub(super) fn scaled(self, scale: f32) -> Self {
-        Self { mean: self.mean.map(|value| scale * value), covariance: self.covariance.map(|value| scale * value) }
     }
 }
 

@@ -4,8 +4,7 @@
 #![allow(clippy::needless_range_loop)] // Planes and pixels index several arrays at once.
 
 use super::alpha::{LANES, Lanes};
-use super::clusters::Color;
-use super::symmetric::{Symmetric, dot, invert, multiply};
+use super::symmetric::{Symmetric, dot, invert, multiply, outer_product};
 use super::{fast_max, fast_min};
 
 /// Isotropic part of regularised covariances: those of few pixels are too narrow.
@@ -17,6 +16,35 @@ pub(super) const MAX_DEVIATION: f32 = 3.0;
 
 /// Maximum reciprocal variance of alpha, since colours are quantised.
 pub(super) const MAX_PRECISION: f32 = 1000.0;
+
+/// Mean and covariance of a surface's colours in linear light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Color {
+    pub mean: [f32; 3],
+    pub covariance: Symmetric,
+}
+
+impl Color {
+    /// Computes mean and covariance from the total weight, and the weighted sums of the light and of its products.
+    #[inline(always)]
+    pub(super) fn from_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
+        let mean = light.map(|light| light / weight);
+        let of_mean = outer_product(mean);
+        Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
+    }
+
+    /// Adds another colour times a weight.
+    #[inline(always)]
+    pub(super) fn add(&mut self, weight: f32, other: &Self) {
+        self.mean.iter_mut().zip(other.mean).for_each(|(sum, value)| *sum += weight * value);
+        self.covariance.iter_mut().zip(other.covariance).for_each(|(sum, value)| *sum += weight * value);
+    }
+
+    #[inline(always)]
+    pub(super) fn scaled(self, scale: f32) -> Self {
+        Self { mean: self.mean.map(|value| scale * value), covariance: self.covariance.map(|value| scale * value) }
+    }
+}
 
 /// Colours of two surfaces, and how well they can be separated.
 #[derive(Clone, Copy, Debug)]

@@ -5,8 +5,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::BackgroundPlate;
-use crate::depth::matting::clusters::Color;
-use crate::depth::matting::contrast::Contrast;
+use crate::depth::matting::contrast::{Color, Contrast};
 use crate::depth::matting::symmetric::{Symmetric, outer_product};
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};

@@ -20,8 +20,7 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
-use super::clusters::Color;
-use super::contrast::{Contrast, Discriminant, color_difference};
+use super::contrast::{Color, Contrast, Discriminant, color_difference};
 use cells::{Cell, Kernel, MaskView, RADIUS, Sums};
 use posterior::Posterior;
 use sides::Sides;
