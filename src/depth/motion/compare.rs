@@ -6,7 +6,6 @@ use crate::depth::tap::nearest_index;
 use crate::frame::DepthMap;
 
 use super::Vector;
-use super::layers::{Cell, Grid};
 
 /// Radius in pixels by which the mask of an untextured near surface is dilated: only its outline shows motion.
 const DILATION_PX: usize = 2;
@@ -14,6 +13,30 @@ const DILATION_PX: usize = 2;
 const MIN_PIXELS: u32 = 20;
 /// Number of rows of a cell that are compared.
 const ROWS: usize = 8;
+
+/// A grid of square cells over pictures of `size`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Grid {
+    pub size: (usize, usize),
+    pub cell_px: usize,
+}
+
+impl Grid {
+    /// Returns the numbers of columns and rows of cells.
+    pub fn cell_counts(&self) -> (usize, usize) {
+        (self.size.0.div_ceil(self.cell_px), self.size.1.div_ceil(self.cell_px))
+    }
+
+    /// Returns the pixel columns and rows of a cell, in a map of size `map` of the same view.
+    #[inline(always)]
+    pub fn cell_range(&self, (column, row): (usize, usize), map: (usize, usize)) -> [Range<usize>; 2] {
+        let on_map =
+            |px: usize, count: usize, of: usize| if of == count { px.min(count) } else { px.min(count) * of / count };
+        let span =
+            |at: usize, count, of| on_map(at * self.cell_px, count, of)..on_map((at + 1) * self.cell_px, count, of);
+        [span(column, self.size.0, map.0), span(row, self.size.1, map.1)]
+    }
+}
 
 /// Two pictures, and the depth of the first.
 pub struct Pictures<'a> {
@@ -32,9 +55,9 @@ impl Pictures<'_> {
         (at % across, at / across)
     }
 
-    /// Computes the mask of a cell's near surface.
+    /// Computes the mask of a cell's near surface, which is nearer than `split_m`.
     #[inline(always)]
-    pub fn compute_mask(&mut self, place: (usize, usize), &Cell { split_m, is_untextured, .. }: &Cell) {
+    pub fn compute_mask(&mut self, place: (usize, usize), split_m: f32, is_untextured: bool) {
         let beyond_px = if is_untextured { DILATION_PX } else { 0 };
         let (width, height) = self.grid.size;
         let [columns, rows] = self.grid.cell_range(place, self.grid.size);

@@ -1,12 +1,10 @@
 //! Cells of a picture, with one or two surfaces each, and the motion of these.
 
-use std::ops::Range;
-
 use crate::frame::DepthMap;
 
 use super::Vector;
 use super::blocks::{BlockMatcher, CELL};
-use super::compare::Pictures;
+use super::compare::{Grid, Pictures};
 
 /// A surface is at rest up to this multiple of the median change, which is mostly camera noise, within these bounds, in
 /// codes.
@@ -85,30 +83,6 @@ pub fn neighbours(
     let range = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
     let cells = range(row, down).flat_map(move |y| range(column, across).map(move |x| (x, y)));
     cells.filter(move |&cell| cell != (column, row))
-}
-
-/// A grid of square cells over pictures of `size`.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Grid {
-    pub size: (usize, usize),
-    pub cell_px: usize,
-}
-
-impl Grid {
-    /// Returns the numbers of columns and rows of cells.
-    pub fn cell_counts(&self) -> (usize, usize) {
-        (self.size.0.div_ceil(self.cell_px), self.size.1.div_ceil(self.cell_px))
-    }
-
-    /// Returns the pixel columns and rows of a cell, in a map of size `map` of the same view.
-    #[inline(always)]
-    pub fn cell_range(&self, (column, row): (usize, usize), map: (usize, usize)) -> [Range<usize>; 2] {
-        let on_map =
-            |px: usize, count: usize, of: usize| if of == count { px.min(count) } else { px.min(count) * of / count };
-        let span =
-            |at: usize, count, of| on_map(at * self.cell_px, count, of)..on_map((at + 1) * self.cell_px, count, of);
-        [span(column, self.size.0, map.0), span(row, self.size.1, map.1)]
-    }
 }
 
 /// Finds the surfaces of all cells: two if inverse depths differ by more than `depth_step`, in 1/m. `ranges` is scratch
@@ -192,7 +166,7 @@ impl Pictures<'_> {
 
     #[inline(always)]
     fn compare_surfaces(&mut self, place: (usize, usize), cell: &mut Cell) {
-        self.compute_mask(place, cell);
+        self.compute_mask(place, cell.split_m, cell.is_untextured);
         for is_near in [true, false] {
             let residual = self.mean_difference(place, [0; 2], Some(is_near));
             if let Some(surface) = cell.surface_mut(is_near) {
@@ -221,7 +195,7 @@ impl Pictures<'_> {
             let place = self.cell_position(at);
             let is_split = cell.far.is_some();
             if is_split {
-                self.compute_mask(place, cell);
+                self.compute_mask(place, cell.split_m, cell.is_untextured);
             }
             // Start from the block vectors of the cell and its neighbours, then refine with halved steps.
             let (mut rough, mut count) = ([[0; 2]; 9], 0);
@@ -259,7 +233,7 @@ impl Pictures<'_> {
             }
             if cell.is_untextured {
                 // The dilated mask moved; the surface's own pixels must match there too, or else it stays at rest.
-                self.compute_mask(place, &Cell { is_untextured: false, ..*cell });
+                self.compute_mask(place, cell.split_m, false);
                 if self
                     .mean_difference(place, cell.near.vector, Some(true))
                     .is_none_or(|residual| residual > rest_threshold)
@@ -301,7 +275,7 @@ impl Pictures<'_> {
                     continue;
                 }
                 if is_split && !is_marked {
-                    self.compute_mask(place, &cells[at]);
+                    self.compute_mask(place, cells[at].split_m, cells[at].is_untextured);
                     is_marked = true;
                 }
                 let residual = self.mean_difference(place, median, is_split.then_some(is_near));

@@ -14,8 +14,8 @@ use pulp::{Arch, WithSimd};
 use super::reduced::block_px;
 use crate::frame::{ColorImage, DepthMap};
 use blocks::{BlockMatcher, CELL};
-use compare::Pictures;
-use layers::{Cell, Grid};
+use compare::{Grid, Pictures};
+use layers::Cell;
 
 /// A displacement in pixels: right, down.
 pub type Vector = [i32; 2];

@@ -5,7 +5,8 @@ use std::ops::Range;
 use pulp::WithSimd;
 
 use super::Vector;
-use super::layers::{Cell, Grid};
+use super::compare::Grid;
+use super::layers::Cell;
 use crate::depth::fill::find_holes;
 use crate::frame::DepthMap;
 
