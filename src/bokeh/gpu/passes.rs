@@ -71,6 +71,45 @@ impl PassBuilder<'_> {
             [uniform_binding::<Work>(&self.buffers.work, work), self.buffers.bins.as_entire_buffer_binding()];
         self.create_pass(shader, &uniforms, buffers, [1; 3])
     }
+
+    /// Creates the passes of a layer of a picture.
+    fn create_layer(&self, index: usize, picture: [u32; 2]) -> Layer {
+        let b = self.buffers;
+        let fill = (index > 0).then(|| {
+            let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
+            let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
+            let coarse = [&b.frame, &b.pyramid, &b.known];
+            let lines = [&b.frame, &b.pyramid, &b.known, &b.dilated];
+            let (seen, nearest, lists) = ([&b.scene, &b.ranges, &b.inpainted], &b.nearest_px, &b.binned);
+            let filled = [
+                &b.frame, &b.pyramid, &b.known, seen[0], seen[1], seen[2], nearest, &b.bins, lists, &b.dilated,
+                &b.mixed,
+            ];
+            let work = [uniform_binding::<Work>(&b.work, index)];
+            [
+                // A thread does four pixels of half the size, or of the picture.
+                self.create_pass(shaders::PULL, &work, &pulled, covering_workgroups(half, 2 * TILE)).with_name(FILL),
+                self.create_pass(shaders::COARSE, &[], &coarse, [1; 3]).with_name(FILL),
+                self.create_pass(shaders::DIRECTIONAL, &[], &lines, covering_workgroups(quarter, SMALL_TILE))
+                    .with_name(FILL),
+                self.create_pass(shaders::FILL, &work, &filled, covering_workgroups(picture, TILE)),
+            ]
+        });
+        let (seen, lists) = ([&b.scene, &b.inpainted, &b.ranges], [&b.binned, &b.filtered]);
+        let bin = [&b.frame, seen[0], seen[1], seen[2], &b.source, &b.grid, &b.mixed, lists[0], lists[1]];
+        Layer { fill, bin: self.create_pass_over_bins(shaders::BIN, index, &bin) }
+    }
+
+    /// Creates the passes that blur with a bank, along rows and down columns, for batch and group of terms `k`.
+    fn create_filters(&self, BankBuffers { taps: [horizontal, vertical], .. }: &BankBuffers, k: usize) -> [Pass; 2] {
+        let b = self.buffers;
+        let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered, &b.active];
+        let columns = [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
+        [
+            self.create_pass_over_bins(shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
+            self.create_pass_over_bins(shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
+        ]
+    }
 }
 
 /// Returns the bindings of `unpack`, including the depth map, whose buffer may be replaced.
@@ -96,9 +135,6 @@ impl Passes {
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, metres: &wgpu::Buffer) -> Self {
         let builder = PassBuilder { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
-        let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
-
-        let find_occluders = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
         let grid = covering_workgroups(
             [plan.width, plan.height].map(|side| side.div_ceil(SILHOUETTE_CELL) as u32),
             SMALL_TILE,
@@ -111,53 +147,15 @@ impl Passes {
                 .create_pass(shaders::DILATE_COLUMNS, &[], &[&b.frame, &b.row_dilated, &b.dilated], grid)
                 .with_name(SILHOUETTES),
         ];
+        let find_occluders = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
+        let half = picture.map(|side| side.div_ceil(2));
         let find_occluders = builder
             .create_pass(shaders::FIND_OCCLUDERS, &[], &find_occluders, covering_workgroups(half, TILE))
             .with_name(FILL);
-        let layers = (0..MAX_LAYERS).map(|index| {
-            let fill = (index > 0).then(|| {
-                let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
-                let coarse = [&b.frame, &b.pyramid, &b.known];
-                let lines = [&b.frame, &b.pyramid, &b.known, &b.dilated];
-                let known = [&b.pyramid, &b.known];
-                let (seen, nearest) = ([&b.scene, &b.ranges, &b.inpainted], &b.nearest_px);
-                let (lists, dilated) = (&b.binned, [&b.dilated, &b.mixed]);
-                let filled = [
-                    &b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, lists, dilated[0],
-                    dilated[1],
-                ];
-                let work = [uniform_binding::<Work>(&b.work, index)];
-                [
-                    // A thread does four pixels of half the size, or of the picture.
-                    builder
-                        .create_pass(shaders::PULL, &work, &pulled, covering_workgroups(half, 2 * TILE))
-                        .with_name(FILL),
-                    builder.create_pass(shaders::COARSE, &[], &coarse, [1; 3]).with_name(FILL),
-                    builder
-                        .create_pass(shaders::DIRECTIONAL, &[], &lines, covering_workgroups(quarter, SMALL_TILE))
-                        .with_name(FILL),
-                    builder.create_pass(shaders::FILL, &work, &filled, covering_workgroups(picture, TILE)),
-                ]
-            });
-            let (seen, lists) = ([&b.scene, &b.inpainted, &b.ranges], [&b.binned, &b.filtered]);
-            let bin = [&b.frame, seen[0], seen[1], seen[2], &b.source, &b.grid, &b.mixed, lists[0], lists[1]];
-            Layer { fill, bin: builder.create_pass_over_bins(shaders::BIN, index, &bin) }
-        });
-        let layers = layers.collect();
-        let filters = |bank: &BankBuffers, k: usize| {
-            let [horizontal, vertical] = &bank.taps;
-            let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered, &b.active];
-            let columns =
-                [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
-            [
-                builder.create_pass_over_bins(shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
-                builder.create_pass_over_bins(shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
-            ]
-        };
         // A batch has at least one bin, so there are no more batches than bins.
         let blur = b.banks.iter().map(|bank| {
             let steps = 0..MAX_BINS * bank.terms.div_ceil(4);
-            steps.map(|k| filters(bank, k)).collect()
+            steps.map(|k| builder.create_filters(bank, k)).collect()
         });
         let blur = blur.collect();
         let gather = plan.exact.then(|| {
@@ -181,7 +179,7 @@ impl Passes {
             unpack,
             silhouettes,
             find_occluders,
-            layers,
+            layers: (0..MAX_LAYERS).map(|index| builder.create_layer(index, picture)).collect(),
             gather,
             reach: builder.create_pass_over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
