@@ -1,5 +1,6 @@
 //! Opens a camera, recording or scene by name, with its recorded depth.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use super::{
@@ -44,7 +45,27 @@ impl Opened {
     /// Opens the source; right pictures are read only if stereo matching will use them.
     pub fn open(name: &SourceName, request: &OpenRequest) -> Result<Self, SourceError> {
         let Options { frames, depth_choice, .. } = request.options;
-        let without_depth = |camera| Self {
+        Ok(Self::without_depth(match name {
+            SourceName::Folder(folder) => return Self::open_recording(folder, request),
+            SourceName::Photo(path) => return Self::open_photo(path, request),
+            SourceName::Synthetic => {
+                let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
+                let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
+                synthetic::open_camera(Format { size, fps, frames: frames.frames, threads: core_count() })?
+            }
+            SourceName::Demo => Box::new(Demo::new(frames.frames)?),
+            SourceName::Stdin => Box::new(Y4m::stdin(frames.frames)?),
+            // A seek would lose count of the frames.
+            SourceName::Video(path) => Box::new(video::open(path, frames, depth_choice.counts_frames())?),
+            SourceName::Camera(camera) => cameras::open(camera, frames)?,
+            SourceName::Cameras(pair) => cameras::open_pair(pair, frames)?,
+            SourceName::PipeWire(name) => pipewire_cameras::open(name, request.options.filters, frames)?,
+            }
+        }))
+    }
+
+    fn without_depth(camera: Box<dyn Camera>) -> Self {
+        Self {
             camera,
             depth: None,
             depth_from: DepthOrigin::Nothing,
@@ -52,64 +73,49 @@ impl Opened {
             findings: Findings::default(),
             pair: StereoGeometry::Uncalibrated,
             disparities: None,
-        };
-        match name {
-            SourceName::Synthetic => {
-                let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
-                let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
-                let format = Format { size, fps, frames: frames.frames, threads: core_count() };
-                Ok(without_depth(synthetic::open_camera(format)?))
-            }
-            SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
-            SourceName::Folder(folder) => {
-                let is_depth_used = matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
-                let recording = Arc::new(registration::open_recording(folder, is_depth_used, request.options)?);
-                let name = folder.display().to_string();
-                warn_of_own_properties(&recording, frames);
-                let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;
-                let pair = recording.stereo_geometry().cloned();
-                if pair.is_some() && request.uses_stereo(recording.has_depth()) {
-                    camera = camera.with_right_camera();
-                }
-                let disparities = recording.disparity_count();
-                let depth_from = recorded_depth_origin(&recording);
-                let first_depth = request.read_first_depth(&recording);
-                let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
-                let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
-                let picture_stems = recording.picture_stems();
-                let depth = match recording.has_depth() {
-                    true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
-                    false => None,
-                };
-                Ok(Self {
-                    depth,
-                    depth_from,
-                    first_depth,
-                    findings: Findings { notes, picture_stems, ..Findings::default() },
-                    pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
-                    disparities,
-                    ..without_depth(Box::new(camera))
-                })
-            }
-            SourceName::Photo(path) => {
-                let photo::ReadPhoto { color, depth, depth_from, mut findings } = photo::read_photo(path, request)?;
-                let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
-                findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());
-                let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
-                let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
-                Ok(Self { depth, depth_from, findings, ..without_depth(Box::new(camera)) })
-            }
-            SourceName::Stdin => Ok(without_depth(Box::new(Y4m::stdin(frames.frames)?))),
-            SourceName::Video(path) => {
-                // A seek would lose count of the frames.
-                Ok(without_depth(Box::new(video::open(path, frames, depth_choice.counts_frames())?)))
-            }
-            SourceName::Camera(camera) => Ok(without_depth(cameras::open(camera, frames)?)),
-            SourceName::Cameras(pair) => Ok(without_depth(cameras::open_pair(pair, frames)?)),
-            SourceName::PipeWire(name) => {
-                Ok(without_depth(pipewire_cameras::open(name, request.options.filters, frames)?))
-            }
         }
+    }
+
+    fn open_recording(folder: &Path, request: &OpenRequest) -> Result<Self, SourceError> {
+        let Options { frames, depth_choice, .. } = request.options;
+        let is_depth_used = matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded);
+        let recording = Arc::new(registration::open_recording(folder, is_depth_used, request.options)?);
+        let name = folder.display().to_string();
+        warn_of_own_properties(&recording, frames);
+        let mut camera = Replay::new(Arc::clone(&recording), &name, &video::play_range(frames))?;
+        let pair = recording.stereo_geometry().cloned();
+        if pair.is_some() && request.uses_stereo(recording.has_depth()) {
+            camera = camera.with_right_camera();
+        }
+        let disparities = recording.disparity_count();
+        let depth_from = recorded_depth_origin(&recording);
+        let first_depth = request.read_first_depth(&recording);
+        let stretch = first_depth.as_ref().and_then(|map| describe_stretch(map.size(), recording.size()));
+        let notes = stretch.map(|stretch| format!("the depth of {name} has {stretch}")).into_iter().collect();
+        let picture_stems = recording.picture_stems();
+        let depth = match recording.has_depth() {
+            true => Some(Box::new(RecordedDepth::new(recording, &name)?) as Box<dyn DepthSource>),
+            false => None,
+        };
+        Ok(Self {
+            depth,
+            depth_from,
+            first_depth,
+            findings: Findings { notes, picture_stems, ..Findings::default() },
+            pair: pair.unwrap_or(StereoGeometry::Uncalibrated),
+            disparities,
+            ..Self::without_depth(Box::new(camera))
+        })
+    }
+
+    fn open_photo(path: &Path, request: &OpenRequest) -> Result<Self, SourceError> {
+        let frames = &request.options.frames;
+        let photo::ReadPhoto { color, depth, depth_from, mut findings } = photo::read_photo(path, request)?;
+        let correction = |map| Misalignment::measure(map, &color)?.correction(map, &color);
+        findings.is_fitting = depth.as_ref().is_some_and(|map| correction(map).is_none());
+        let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
+        let depth = depth.map(|map| Box::new(ConstantDepth(map)) as Box<dyn DepthSource>);
+        Ok(Self { depth, depth_from, findings, ..Self::without_depth(Box::new(camera)) })
     }
 }
 
