@@ -18,7 +18,7 @@ use super::{DepthUnit, Options, Unpaired, depth_covers, pair, timeline};
 use crate::files::input;
 use bokehcam::calibration::registration::RgbdCalibration;
 use file::KinectFile;
-use track::{Block, Track};
+use track::{Block, ColorFormat, Track};
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "Azure Kinect",
@@ -48,6 +48,21 @@ fn is_kinect(path: &Path) -> io::Result<bool> {
     Ok(has_grey16 || found.has_kinect_tags() && has_color())
 }
 
+/// Returns the track of colour, which has pictures, and their format.
+fn find_color(found: &scan::Contents) -> Result<(&Track, ColorFormat), String> {
+    let no_color = "it has no colour pictures (track COLOR); record with the colour camera on";
+    let color = found.track(COLOR).ok_or(no_color)?;
+    let format = color.color_format().ok_or_else(|| {
+        let format = color.format.escape_debug();
+        format!("its colour pictures have the format {format}, which is not read; record them as MJPG")
+    })?;
+    if color.in_order().is_empty() {
+        let damage = found.damage.as_ref().map_or(String::new(), |damage| format!(" ({damage})"));
+        return Err(format!("no colour picture in it is whole{damage}; copy it again"));
+    }
+    Ok((color, format))
+}
+
 /// Finds the pictures, and pairs those of colour and depth.
 fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let path = &folder.dir;
@@ -55,17 +70,8 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let fault = |what: String| RecordingError::File { path: path.clone(), what };
     let file = input::open(path).map_err(RecordingError::io("open the recording", path))?;
     let found = scan::scan(&file, &name).map_err(RecordingError::io("read the recording", path))?;
-    let no_color = "it has no colour pictures (track COLOR); record with the colour camera on";
-    let color = found.track(COLOR).ok_or_else(|| fault(no_color.to_owned()))?;
-    let color_format = color.color_format().ok_or_else(|| {
-        let format = color.format.escape_debug();
-        fault(format!("its colour pictures have the format {format}, which is not read; record them as MJPG"))
-    })?;
+    let (color, color_format) = find_color(&found).map_err(fault)?;
     let colors = color.in_order();
-    if colors.is_empty() {
-        let damage = found.damage.as_ref().map_or(String::new(), |damage| format!(" ({damage})"));
-        return Err(fault(format!("no colour picture in it is whole{damage}; copy it again")));
-    }
     if let Some(damage) = &found.damage {
         tracing::warn!("{name}: damaged: {damage}; what is whole is played");
     }

@@ -23,6 +23,7 @@ use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::{DepthUnit, Options, Unpaired, pair, timeline};
 use crate::files::input;
+use bokehcam::calibration::registration::RgbdCalibration;
 use chunk::ChunkCache;
 use file::McapFile;
 use topic::{Message, Topic};
@@ -61,18 +62,42 @@ fn starts_with_magic(path: &Path) -> bool {
     input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == scan::MAGIC
 }
 
+/// Returns the only file of a recording.
+fn find_file(path: &Path) -> Result<PathBuf, String> {
+    let path = match &find_files(path)[..] {
+        [path] => path.clone(),
+        [first, ..] => return Err(format!("several files; give one of them, such as {}", first.display())),
+        [] => path.to_owned(),
+    };
+    match starts_with_magic(&path) {
+        true => Ok(path),
+        false => Err("not an MCAP file, although its name says so; copy it again".to_owned()),
+    }
+}
+
+/// Returns how depth is registered to colour, if it is of another camera, and the file says how.
+fn find_calibration(found: &channels::Contents, name: &str, depth: &Topic, color: &Topic) -> Option<RgbdCalibration> {
+    if depth.frame_id == color.frame_id {
+        return None;
+    }
+    let (of_depth, of_color) = (depth.frame_id.escape_debug(), color.frame_id.escape_debug());
+    let views = format!("the depth of {depth} is of another camera ({of_depth}) than the colour ({of_color})");
+    let calibration = found.cameras.find_calibration(depth, color);
+    match &calibration {
+        Ok(_) => tracing::info!("{name}: {views}; it is registered by their camera_info and /tf_static"),
+        Err(missing) => tracing::warn!(
+            "{name}: {views}, and is taken as if both had the same view, because {missing}; record aligned depth, \
+             or give --depth-calibration"
+        ),
+    }
+    calibration.ok()
+}
+
 /// Opens the file, chooses its topics, and pairs their pictures.
 fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let fault = |what: String| RecordingError::File { path: folder.dir.clone(), what };
-    let path = match &find_files(&folder.dir)[..] {
-        [path] => path.clone(),
-        [first, ..] => return Err(fault(format!("several files; give one of them, such as {}", first.display()))),
-        [] => folder.dir.clone(),
-    };
+    let path = find_file(&folder.dir).map_err(fault)?;
     let name = path.display().to_string();
-    if !starts_with_magic(&path) {
-        return Err(fault("not an MCAP file, although its name says so; copy it again".to_owned()));
-    }
     let file = input::open(&path).map_err(RecordingError::io("open the recording", &path))?;
     let found = scan::scan(&file, &name).map_err(RecordingError::io("read the recording", &path))?;
     let ending = || found.damage.as_ref().map_or(String::new(), |damage| format!("; {damage}"));
@@ -87,22 +112,8 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
         tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
     }
-    let mut depth_calibration = None;
-    let is_of_other_camera = |depth: &&Topic| depth.frame_id != color.frame_id && options.depth_calibration.is_none();
-    if let Some(depth) = depth.filter(is_of_other_camera) {
-        let (of_depth, of_color) = (depth.frame_id.escape_debug(), color.frame_id.escape_debug());
-        let views = format!("the depth of {depth} is of another camera ({of_depth}) than the colour ({of_color})");
-        match found.cameras.find_calibration(depth, color) {
-            Ok(calibration) => {
-                tracing::info!("{name}: {views}; it is registered by their camera_info and /tf_static");
-                depth_calibration = Some(calibration);
-            }
-            Err(missing) => tracing::warn!(
-                "{name}: {views}, and is taken as if both had the same view, because {missing}; record aligned depth, \
-                 or give --depth-calibration"
-            ),
-        }
-    }
+    let registered = depth.filter(|_| options.depth_calibration.is_none());
+    let depth_calibration = registered.and_then(|depth| find_calibration(&found, &name, depth, color));
     if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
         tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
     }
