@@ -108,38 +108,50 @@ impl<'a> Stage<'a> {
             }
             log_frame(frame.stamp.index, &blurred.coc, &frame.trace);
             let quality = frame.trace.quality;
-            // A frame that the sink does not keep counts as delivered once the viewer took it.
-            let kept = was_given && self.sink.has_outputs();
-            let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
-            let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
-            done.into_iter().for_each(|ticket| counter.count_delivered(ticket));
-            if let Some(view) = &mut self.view {
-                let Blurred { picture, color, depth, coc, crop, .. } = blurred;
-                let view_of = View {
-                    picture,
-                    color,
-                    depth,
-                    coc,
-                    stamp,
-                    captured_ns,
-                    crop,
-                    change,
-                    is_transitional,
-                    seek,
-                    is_seek_target,
-                    trace,
-                };
-                match view.send(view_of) {
-                    // A displaced frame is the previous one, which the viewer did not take.
-                    Ok(displaced) => self.count_viewed(displaced.is_none(), std::mem::replace(&mut at_viewer, open)),
-                    // The fate of this frame and of the previous one is unknown: both stay in flight.
-                    Err(link::Abandoned) => return Ok(()),
-                }
+            let is_kept = was_given && self.sink.has_outputs();
+            if let Err(link::Abandoned) = self.send_to_viewer(frame, blurred, is_kept, &mut at_viewer) {
+                return Ok(());
             }
             self.report_progress(quality);
         }
         // The viewer still takes the last frame.
         self.count_viewed(true, at_viewer);
+        Ok(())
+    }
+
+    /// Sends a frame to the viewer, if there is one. A frame that the sink does not keep counts as delivered once the
+    /// viewer took it.
+    ///
+    /// # Errors
+    /// The viewer is gone; the fate of this frame and of the previous one is unknown, and both stay in flight.
+    fn send_to_viewer(
+        &mut self,
+        frame: Frame<()>,
+        Blurred { picture, color, depth, coc, crop, .. }: Blurred,
+        is_kept: bool,
+        at_viewer: &mut Option<FrameTicket>,
+    ) -> Result<(), link::Abandoned> {
+        let Frame { ticket, stamp, seek, is_seek_target, change, is_transitional, trace, .. } = frame;
+        let captured_ns = ticket.captured_ns;
+        let (done, open) = if self.view.is_none() || is_kept { (Some(ticket), None) } else { (None, Some(ticket)) };
+        done.into_iter().for_each(|ticket| self.shared.counter.count_delivered(ticket));
+        let Some(view) = &mut self.view else { return Ok(()) };
+        let displaced = view.send(View {
+            picture,
+            color,
+            depth,
+            coc,
+            stamp,
+            captured_ns,
+            crop,
+            change,
+            is_transitional,
+            seek,
+            is_seek_target,
+            trace,
+        })?;
+        // A displaced frame is the previous one, which the viewer did not take.
+        self.count_viewed(displaced.is_none(), std::mem::replace(at_viewer, open));
         Ok(())
     }
 
