@@ -201,22 +201,7 @@ impl Listener {
         let requested = self.handler.borrow_mut().choose_mode(&camera.modes).map_err(refused)?;
         // A camera states its format only to readers that keep it running.
         let is_passive = self.filters && self.ready.borrow().is_none();
-        let mut props = properties! {
-            *pipewire::keys::MEDIA_TYPE => "Video",
-            *pipewire::keys::MEDIA_CATEGORY => "Capture",
-            *pipewire::keys::MEDIA_ROLE => "Camera",
-            // Other programs would take a node with the name `bokehcam` for a camera.
-            *pipewire::keys::NODE_NAME => "bokehcam-reader",
-            "target.object" => camera.serial.as_str(),
-        };
-        if self.filters {
-            props.insert("node.link-group", super::link_group());
-        }
-        if is_passive {
-            props.insert("node.passive", "in");
-        }
-        let stream =
-            StreamRc::new(session.core.clone(), "bokehcam", props).map_err(PipeWireError::refused("a stream"))?;
+        let stream = self.create_stream(&session, &camera, is_passive)?;
         self.camera.replace(Some(camera));
         let has_ended = Rc::new(Cell::new(false));
         let [formats, pictures] = std::array::from_fn(|_| Rc::clone(self));
@@ -247,25 +232,45 @@ impl Listener {
 
         self.last_ns.set(self.clock.now_ns());
         self.sequence.set(None);
-        while !stop.load(Ordering::Acquire) && wanted.load(Ordering::Acquire) {
-            if self.filters && !is_passive && self.ready.borrow().is_none() {
-                break;
-            }
-            if is_passive && stream.state() != StreamState::Streaming {
-                session.iterate(Some(IDLE_WAIT));
-                self.last_ns.set(self.clock.now_ns());
-                if session.is_lost() || has_ended.get() {
-                    break;
-                }
-                continue;
-            }
-            let until_ns = self.last_ns.get() + self.timeout_ns();
-            session.iterate(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
-            if session.is_lost() || has_ended.get() || self.clock.now_ns() >= until_ns.max(self.last_ns.get()) {
-                break;
-            }
-        }
+        while !stop.load(Ordering::Acquire)
+            && wanted.load(Ordering::Acquire)
+            && self.wait_for_picture(&session, &stream, is_passive, &has_ended)
+        {}
         Ok(())
+    }
+
+    fn create_stream(&self, session: &Session, camera: &Camera, is_passive: bool) -> Result<StreamRc, PipeWireError> {
+        let mut props = properties! {
+            *pipewire::keys::MEDIA_TYPE => "Video",
+            *pipewire::keys::MEDIA_CATEGORY => "Capture",
+            *pipewire::keys::MEDIA_ROLE => "Camera",
+            // Other programs would take a node with the name `bokehcam` for a camera.
+            *pipewire::keys::NODE_NAME => "bokehcam-reader",
+            "target.object" => camera.serial.as_str(),
+        };
+        if self.filters {
+            props.insert("node.link-group", super::link_group());
+        }
+        if is_passive {
+            props.insert("node.passive", "in");
+        }
+        StreamRc::new(session.core.clone(), "bokehcam", props).map_err(PipeWireError::refused("a stream"))
+    }
+
+    /// Lets the stream run until a picture came, or is overdue; returns whether it goes on.
+    fn wait_for_picture(&self, session: &Session, stream: &Stream, is_passive: bool, has_ended: &Cell<bool>) -> bool {
+        if self.filters && !is_passive && self.ready.borrow().is_none() {
+            return false;
+        }
+        let is_alive = || !session.is_lost() && !has_ended.get();
+        if is_passive && stream.state() != StreamState::Streaming {
+            session.iterate(Some(IDLE_WAIT));
+            self.last_ns.set(self.clock.now_ns());
+            return is_alive();
+        }
+        let until_ns = self.last_ns.get() + self.timeout_ns();
+        session.iterate(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
+        is_alive() && self.clock.now_ns() < until_ns.max(self.last_ns.get())
     }
 
     fn timeout_ns(&self) -> u64 {

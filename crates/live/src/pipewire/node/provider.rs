@@ -144,19 +144,7 @@ impl Provider {
         ready: &mut Option<&Ready>,
     ) -> Result<(), PipeWireError> {
         let session = Session::open()?;
-        let Settings { name, label, modes, best, filter_target, .. } = &self.settings;
-        let mut props = properties! {
-            *pipewire::keys::MEDIA_CLASS => "Video/Source",
-            *pipewire::keys::MEDIA_ROLE => "Camera",
-            *pipewire::keys::NODE_NAME => name.as_str(),
-            *pipewire::keys::NODE_DESCRIPTION => label.as_str(),
-        };
-        if let Some(camera) = filter_target {
-            props.insert("node.link-group", crate::pipewire::link_group());
-            props.insert("filter.smart", "true");
-            props.insert("filter.smart.target", serde_json::json!({ "node.name": camera }).to_string());
-        }
-        let stream = StreamRc::new(session.core.clone(), name, props).map_err(PipeWireError::refused("a stream"))?;
+        let stream = self.create_stream(&session)?;
         let failure = Rc::new(RefCell::new(None));
         let [states, formats, pictures] = std::array::from_fn(|_| Rc::clone(self));
         let failed = Rc::clone(&failure);
@@ -177,6 +165,7 @@ impl Provider {
             .process(move |stream, ()| pictures.deliver_picture(stream))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
+        let Settings { modes, best, filter_target, .. } = &self.settings;
         let formats: Vec<Vec<u8>> = modes.iter().map(|mode| param::build_offer(mode, best)).collect();
         let mut formats: Vec<&Pod> = formats.iter().filter_map(|format| Pod::from_bytes(format)).collect();
         // A filter runs at the pace of the camera, which drives both.
@@ -212,6 +201,22 @@ impl Provider {
             }
         }
         Ok(())
+    }
+
+    fn create_stream(&self, session: &Session) -> Result<StreamRc, PipeWireError> {
+        let Settings { name, label, filter_target, .. } = &self.settings;
+        let mut props = properties! {
+            *pipewire::keys::MEDIA_CLASS => "Video/Source",
+            *pipewire::keys::MEDIA_ROLE => "Camera",
+            *pipewire::keys::NODE_NAME => name.as_str(),
+            *pipewire::keys::NODE_DESCRIPTION => label.as_str(),
+        };
+        if let Some(camera) = filter_target {
+            props.insert("node.link-group", crate::pipewire::link_group());
+            props.insert("filter.smart", "true");
+            props.insert("filter.smart.target", serde_json::json!({ "node.name": camera }).to_string());
+        }
+        StreamRc::new(session.core.clone(), name, props).map_err(PipeWireError::refused("a stream"))
     }
 
     /// Reports that the node is in the graph: to the receiver for the first time, or in the log after a reconnection.
