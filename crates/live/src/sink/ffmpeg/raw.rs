@@ -35,7 +35,7 @@ impl<W: Write> RawVideo<W> {
     /// channel if `has_alpha`. Writes its header at once.
     pub(super) fn new(mut writer: W, size: (u32, u32), period_ns: u64, has_alpha: bool) -> io::Result<Self> {
         let matrix = Some(YcbcrMatrix::for_height(size.1)).filter(|_| !has_alpha);
-        writer.write_all(&encode_header(size, period_ns, matrix))?;
+        writer.write_all(&encode_header(&encode_track(size, period_ns, matrix)))?;
         Ok(Self {
             writer,
             converter: matrix.map(|matrix| Converter::new(matrix, Range::Limited)),
@@ -105,11 +105,46 @@ fn encode_element(id: &[u8], content: &[u8]) -> Vec<u8> {
     element
 }
 
+/// Returns an element with a number.
+fn number(id: &[u8], value: u64) -> Vec<u8> {
+    encode_element(id, &value.to_be_bytes())
+}
+
+/// Returns an element that consists of others.
+fn master_element(id: &[u8], parts: &[Vec<u8>]) -> Vec<u8> {
+    encode_element(id, &parts.concat())
+}
+
 /// Builds everything before the first cluster: the EBML header, and the head of an endless segment with its info and
-/// one track, of RGBA if there is no `matrix`.
-fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: Option<YcbcrMatrix>) -> Vec<u8> {
-    let number = |id: &[u8], value: u64| encode_element(id, &value.to_be_bytes());
-    let master_element = |id: &[u8], parts: &[Vec<u8>]| encode_element(id, &parts.concat());
+/// one `track`.
+fn encode_header(track: &[u8]) -> Vec<u8> {
+    let mut header = master_element(
+        &[0x1a, 0x45, 0xdf, 0xa3],
+        &[
+            // Versions, longest identifiers and sizes, document type and its versions.
+            number(&[0x42, 0x86], 1),
+            number(&[0x42, 0xf7], 1),
+            number(&[0x42, 0xf2], 4),
+            number(&[0x42, 0xf3], 8),
+            encode_element(&[0x42, 0x82], b"matroska"),
+            number(&[0x42, 0x87], 4),
+            number(&[0x42, 0x85], 2),
+        ],
+    );
+    header.extend_from_slice(SEGMENT);
+    header.extend_from_slice(&UNKNOWN_SIZE);
+    // Info: the length of a tick, the muxing and the writing program.
+    let app_name = |id: &[u8]| encode_element(id, b"bokehcam");
+    header.extend(master_element(
+        &[0x15, 0x49, 0xa9, 0x66],
+        &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), app_name(&[0x4d, 0x80]), app_name(&[0x57, 0x41])],
+    ));
+    header.extend(encode_element(&[0x16, 0x54, 0xae, 0x6b], track));
+    header
+}
+
+/// Builds the track of a video, of RGBA if there is no `matrix`.
+fn encode_track((width, height): (u32, u32), period_ns: u64, matrix: Option<YcbcrMatrix>) -> Vec<u8> {
     // Codes of ITU-T H.273.
     let (color, layout) = match matrix {
         Some(YcbcrMatrix::Bt601) => (6, b"I420"),
@@ -139,7 +174,7 @@ fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: Option<Ycb
             if matrix.is_some() { colour } else { Vec::new() },
         ],
     );
-    let track = master_element(
+    master_element(
         &[0xae],
         &[
             // Number and unique number.
@@ -153,28 +188,5 @@ fn encode_header((width, height): (u32, u32), period_ns: u64, matrix: Option<Ycb
             number(&[0x23, 0xe3, 0x83], period_ns),
             video,
         ],
-    );
-    let mut header = master_element(
-        &[0x1a, 0x45, 0xdf, 0xa3],
-        &[
-            // Versions, longest identifiers and sizes, document type and its versions.
-            number(&[0x42, 0x86], 1),
-            number(&[0x42, 0xf7], 1),
-            number(&[0x42, 0xf2], 4),
-            number(&[0x42, 0xf3], 8),
-            encode_element(&[0x42, 0x82], b"matroska"),
-            number(&[0x42, 0x87], 4),
-            number(&[0x42, 0x85], 2),
-        ],
-    );
-    header.extend_from_slice(SEGMENT);
-    header.extend_from_slice(&UNKNOWN_SIZE);
-    // Info: the length of a tick, the muxing and the writing program.
-    let app_name = |id: &[u8]| encode_element(id, b"bokehcam");
-    header.extend(master_element(
-        &[0x15, 0x49, 0xa9, 0x66],
-        &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), app_name(&[0x4d, 0x80]), app_name(&[0x57, 0x41])],
-    ));
-    header.extend(encode_element(&[0x16, 0x54, 0xae, 0x6b], &track));
-    header
+    )
 }
