@@ -60,6 +60,25 @@ impl NetworkOutput<'_> {
     }
 }
 
+/// Returns width and height for a variable input size: small, and divisible by the usual strides of networks.
+fn usual_size(task: Task) -> [usize; 2] {
+    match task {
+        Task::Matte => [256, 144],
+        Task::Mono => [320, 192],
+    }
+}
+
+/// Returns the index of the output that is the result, by its name or else its shape.
+fn find_output(outputs: &[Port]) -> Option<usize> {
+    let is_named = |port: &Port| {
+        let name = port.name.to_lowercase();
+        ["pha", "alpha", "mask", "depth"].iter().any(|part| name.contains(part))
+    };
+    let is_picture = |port: &Port| channel_axis(port, &[1, 2]).is_some();
+    let named = outputs.iter().position(|port| is_named(port) && is_picture(port));
+    named.or_else(|| outputs.iter().position(is_picture)).or((outputs.len() == 1).then_some(0))
+}
+
 impl PictureNetwork {
     /// Finds the inputs and outputs of a network.
     ///
@@ -77,11 +96,7 @@ impl PictureNetwork {
         };
         let is_planar = channel_axis(&inputs[picture], &[3]) == Some(1);
         let sides = if is_planar { [3, 2] } else { [2, 1] };
-        // For a variable input size: small, and divisible by the usual strides of networks.
-        let usual = match task {
-            Task::Matte => [256, 144],
-            Task::Mono => [320, 192],
-        };
+        let usual = usual_size(task);
         let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return Err(format!(
@@ -90,15 +105,7 @@ impl PictureNetwork {
             ));
         }
         let outputs = &network.outputs;
-        let find_output = |named: bool| {
-            (0..outputs.len()).find(|&k| {
-                let name = outputs[k].name.to_lowercase();
-                (!named || ["pha", "alpha", "mask", "depth"].iter().any(|part| name.contains(part)))
-                    && channel_axis(&outputs[k], &[1, 2]).is_some()
-            })
-        };
-        let output = find_output(true).or_else(|| find_output(false)).or((outputs.len() == 1).then_some(0));
-        let output = output.ok_or("none of its outputs is a picture with one or two channels")?;
+        let output = find_output(outputs).ok_or("none of its outputs is a picture with one or two channels")?;
         // Other inputs are recurrent states, in the order of the outputs (as in Robust Video Matting), or a ratio.
         let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
         let states =

@@ -161,18 +161,7 @@ impl Scanner<'_> {
                     read = next;
                 }
                 SCHEMA | CHANNEL if length <= MAX_DEFINITION_BYTES => {
-                    let mut content = vec![0; length as usize];
-                    reader.read_exact(&mut content)?;
-                    let defined = match head[0] {
-                        SCHEMA => self.channels.define_schema(&content),
-                        _ => self.channels.define(&content, &mut self.found),
-                    };
-                    if self.found.topics.len() > MAX_TOPICS {
-                        return Err(Damage::Fault(format!("more than {MAX_TOPICS} topics with pictures")));
-                    }
-                    if defined.is_none() {
-                        self.note_damage(format!("a schema or channel at byte {at} is damaged"));
-                    }
+                    self.scan_definition(reader, head[0], length, *at)?;
                     read = next;
                 }
                 MESSAGE => read += self.scan_message(reader, content_at, length, chunk)?,
@@ -185,6 +174,23 @@ impl Scanner<'_> {
             Some(_) => Ok(()),
             None => Err(Damage::Fault("the end of the file is missing".to_owned())),
         }
+    }
+
+    /// Notes a schema or a channel.
+    fn scan_definition(&mut self, reader: &mut impl Read, code: u8, length: u64, at: u64) -> End {
+        let mut content = vec![0; length as usize];
+        reader.read_exact(&mut content)?;
+        let defined = match code {
+            SCHEMA => self.channels.define_schema(&content),
+            _ => self.channels.define(&content, &mut self.found),
+        };
+        if self.found.topics.len() > MAX_TOPICS {
+            return Err(Damage::Fault(format!("more than {MAX_TOPICS} topics with pictures")));
+        }
+        if defined.is_none() {
+            self.note_damage(format!("a schema or channel at byte {at} is damaged"));
+        }
+        Ok(())
     }
 
     /// Notes a message with a picture; returns the number of bytes read.
