@@ -91,9 +91,18 @@ impl WithSimd for MarkSilhouettes<'_> {
                 }
             }
         }
+        self.mark_mixed_pixels(min_step_px);
+    }
+}
+
+impl MarkSilhouettes<'_> {
+    #[inline(always)]
+    fn mark_mixed_pixels(self, min_step_px: f32) {
         let (Some(matte), Radii::Field(CocField::Depth(lens), _)) = (self.source.matte, self.source.coc) else {
             return;
         };
+        let width = self.source.size.0;
+        let across = width.div_ceil(SILHOUETTE_CELL);
         for pixel in matte.pixels_in(self.rows.start * width..self.rows.end * width) {
             let (x, y) = (pixel.at as usize % width, pixel.at as usize / width);
             let (near_px, far_px) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));

@@ -93,10 +93,16 @@ impl Buffers {
         let buffer = |label: &str, bytes: usize, usage: Usage| {
             device.create_buffer(label, bytes.next_multiple_of(16), usage | Usage::COPY_DST)
         };
-        let with_data = |label: &str, data: &[u8], usage: Usage| {
-            let target = buffer(label, data.len(), usage);
+        let with_data = |label: &str, data: &[u8]| {
+            let target = buffer(label, data.len(), Usage::STORAGE);
             device.queue.write_buffer(&target, 0, data);
             target
+        };
+        let bank_buffers = |bank: &FilterBank| BankBuffers {
+            terms: bank.terms,
+            taps: [&bank.horizontal, &bank.vertical]
+                .map(|taps| with_data("bank", bytemuck::cast_slice(&pad_to_fours(taps, bank.terms)))),
+            node_half_width: with_data("node reach", bytemuck::cast_slice(&bank.node_half_width)),
         };
         // In words of four bytes: a bin's pixel is four halves, a cell or an edge eight floats.
         let storage = |label: &str, words: usize| buffer(label, words * 4, Usage::STORAGE | Usage::COPY_SRC);
@@ -135,25 +141,10 @@ impl Buffers {
             nearest_px: storage("nearest", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),
             known: storage("known", pyramid_pixels),
-            banks: plan
-                .ladder
-                .banks
-                .iter()
-                .map(|bank| BankBuffers {
-                    terms: bank.terms,
-                    taps: [&bank.horizontal, &bank.vertical].map(|taps| {
-                        with_data("bank", bytemuck::cast_slice(&pad_to_fours(taps, bank.terms)), Usage::STORAGE)
-                    }),
-                    node_half_width: with_data(
-                        "node reach",
-                        bytemuck::cast_slice(&bank.node_half_width),
-                        Usage::STORAGE,
-                    ),
-                })
-                .collect(),
+            banks: plan.ladder.banks.iter().map(|bank| bank_buffers(bank)).collect(),
             kernels: [
-                with_data("kernel starts", bytemuck::cast_slice(&starts), Usage::STORAGE),
-                with_data("kernels", bytemuck::cast_slice(&kernels), Usage::STORAGE),
+                with_data("kernel starts", bytemuck::cast_slice(&starts)),
+                with_data("kernels", bytemuck::cast_slice(&kernels)),
             ],
         }
     }

@@ -88,12 +88,31 @@ impl GpuBokeh {
         Ok(Self { plan, device, buffers, metres, capacity, layout, passes, ring, refused, results })
     }
 
+    /// Columns and rows of its pictures.
+    fn size(&self) -> (u32, u32) {
+        (self.plan.width as u32, self.plan.height as u32)
+    }
+
+    /// Uploads the depth map of a job, if its CoC follows it; returns it instead if it is on the device already.
+    fn upload_depth<'a>(&mut self, job: &Job, shared: Option<&'a DeviceFrame>) -> Option<&'a wgpu::Buffer> {
+        let (CocField::Depth(_), Some(map)) = (job.coc, &job.depth) else { return None };
+        let metres = shared.filter(|_| map.size() == self.size()).map(|frame| &frame.metres);
+        if 4 * map.metres.len() as u64 > self.metres.size() {
+            self.metres = Buffers::create_depth_buffer(&self.device, map.metres.len());
+            self.passes.bind_depth_buffer(&self.device, &self.buffers, &self.metres);
+        }
+        if metres.is_none() {
+            self.device.upload(&self.metres, 0, bytemuck::cast_slice(&map.metres));
+        }
+        metres
+    }
+
     /// Returns a free picture on the device for a result, if `place` asks for one.
     fn take_device_picture(&mut self, place: PictureLocation) -> Option<Pooled<DevicePicture>> {
         if place == PictureLocation::Memory {
             return None;
         }
-        let (device, size) = (&self.device, (self.plan.width as u32, self.plan.height as u32));
+        let (device, size) = (&self.device, self.size());
         self.results
             .get_or_insert_with(|| Pool::new(MAX_DEVICE_PICTURES, || DevicePicture::new(device, size)))
             .try_take()
@@ -149,7 +168,7 @@ fn max_coc_px(coc: &CocField) -> f32 {
 
 impl Bokeh for GpuBokeh {
     fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        let made_for = (self.plan.width as u32, self.plan.height as u32);
+        let made_for = self.size();
         if job.color.size() != made_for {
             return Err(BokehError::Size { made_for, got: job.color.size() });
         }
@@ -176,17 +195,7 @@ impl Bokeh for GpuBokeh {
         let is_here = |frame: &Pooled<DeviceFrame>| frame.is_on(&self.device) && frame.size() == made_for;
         // Kept until this frame is submitted: its buffers may be overwritten only afterwards.
         let shared = job.on_device.take().filter(is_here);
-        let mut shared_metres = None;
-        if let (CocField::Depth(_), Some(map)) = (job.coc, &job.depth) {
-            shared_metres = shared.as_deref().filter(|_| map.size() == made_for).map(|frame| &frame.metres);
-            if 4 * map.metres.len() as u64 > self.metres.size() {
-                self.metres = Buffers::create_depth_buffer(&self.device, map.metres.len());
-                self.passes.bind_depth_buffer(&self.device, &self.buffers, &self.metres);
-            }
-            if shared_metres.is_none() {
-                self.device.upload(&self.metres, 0, bytemuck::cast_slice(&map.metres));
-            }
-        }
+        let shared_metres = self.upload_depth(&job, shared.as_deref());
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
             self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));
         }
@@ -210,8 +219,8 @@ impl Bokeh for GpuBokeh {
         }
         self.passes.record(&mut recorder, &self.plan, &self.layout);
         let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);
-        if let Some(picture) = &on_device {
-            encoder.copy_buffer_to_buffer(result, 0, picture.buffer(), 0, result.size().min(picture.buffer().size()));
+        if let Some(picture) = on_device.as_deref().map(DevicePicture::buffer) {
+            encoder.copy_buffer_to_buffer(result, 0, picture, 0, result.size().min(picture.size()));
         }
         let in_memory = on_device.is_none() || job.place == PictureLocation::Both;
         let copied = match &job.yuyv {
