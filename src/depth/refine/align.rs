@@ -89,22 +89,11 @@ impl Aligner {
         self.moved.clear();
         self.pixels.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, tiles, spatial_weights, worklist, results, pixels, moved } = self;
             if round == 0 {
-                resize_buffer(edge, inverse.len());
-                [&mut *band, &mut *scratch].into_iter().for_each(|mask| reset_buffer(mask, inverse.len()));
-                tiles.clear(width, height);
-                let parts = bands.rows().zip(bands.split(edge, width)).zip(tiles.split(bands));
-                workers.run_each(parts, &|((rows, edge), has_edge)| {
-                    let columns = |_| iter::once(0..width);
-                    arch.dispatch(FindEdges { inverse, width, depth_step, columns, rows, edge: &mut *edge });
-                    tiles::mark_edge_tiles(has_edge, edge, width);
-                });
-                tiles.mark_neighbours();
-                worklist.clear();
-                tiles.collect_edges(edge, worklist);
-                planes.resize(width, height, RADIUS_LANES);
-            } else {
+                self.find_all_edges((arch, workers), inverse, width, depth_step, bands);
+            }
+            let Self { planes, edge, band, scratch, tiles, spatial_weights, worklist, results, pixels, moved } = self;
+            if round > 0 {
                 // Only pixels that moved in the last round can have moved edges, or can move their neighbours now.
                 workers.run_each(bands.rows().zip(bands.split(edge, width)), &|(rows, edge)| {
                     arch.dispatch(FindEdges {
@@ -146,6 +135,31 @@ impl Aligner {
             }
         }
         snap_to_surfaces(&self.pixels, inverse, rgb, width, depth_step);
+    }
+
+    /// Finds the edges of a new map, their tiles, and the first worklist.
+    fn find_all_edges(
+        &mut self,
+        (arch, workers): (Arch, &mut ThreadPool),
+        inverse: &[f32],
+        width: usize,
+        depth_step: f32,
+        bands: Bands,
+    ) {
+        let (Self { planes, edge, band, scratch, tiles, worklist, .. }, height) = (self, inverse.len() / width);
+        resize_buffer(edge, inverse.len());
+        [band, scratch].into_iter().for_each(|mask| reset_buffer(mask, inverse.len()));
+        tiles.clear(width, height);
+        let parts = bands.rows().zip(bands.split(edge, width)).zip(tiles.split(bands));
+        workers.run_each(parts, &|((rows, edge), has_edge)| {
+            let columns = |_| iter::once(0..width);
+            arch.dispatch(FindEdges { inverse, width, depth_step, columns, rows, edge: &mut *edge });
+            tiles::mark_edge_tiles(has_edge, edge, width);
+        });
+        tiles.mark_neighbours();
+        worklist.clear();
+        tiles.collect_edges(edge, worklist);
+        planes.resize(width, height, RADIUS_LANES);
     }
 }
 

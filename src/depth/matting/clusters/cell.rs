@@ -156,20 +156,29 @@ pub fn cluster_cell<S: Simd>(simd: S, view: &FrameView, column: usize, row: usiz
     let far = if is_one { Cluster::default() } else { samples.compute_cluster(&far, corner) };
     let mut clusters = [samples.compute_cluster(&near, corner), far, Cluster::default()];
     if all.0 - all.1 > depth_step {
-        let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
-        for place in set_bits(edges) {
-            let value = values[place];
-            if value > 0.5 * (all.0 + all.1) {
-                let (x, y) = (place % CELL_PX, place / CELL_PX);
-                let light = view.light((top + y) * width + left + x);
-                let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer_product(light));
-                sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
-                of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
-            }
-        }
-        clusters[FRINGE] = Cluster::new(sums, of_place, corner);
+        clusters[FRINGE] = cluster_fringe(view, &values, edges, 0.5 * (all.0 + all.1), corner);
     }
     clusters
+}
+
+/// Computes the cluster of the pixels at `edges` that have more than the inverse depth `middle`.
+#[inline(always)]
+fn cluster_fringe(
+    view: &FrameView,
+    values: &[f32; PIXELS],
+    edges: u64,
+    middle: f32,
+    corner @ (left, top): (usize, usize),
+) -> Cluster {
+    let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
+    for (place, value) in set_bits(edges).map(|place| (place, values[place])).filter(|&(_, value)| value > middle) {
+        let (x, y) = (place % CELL_PX, place / CELL_PX);
+        let light = view.light((top + y) * view.size.0 + left + x);
+        let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer_product(light));
+        sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
+        of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
+    }
+    Cluster::new(sums, of_place, corner)
 }
 
 /// Bits of one row of a cell.
