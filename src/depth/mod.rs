@@ -36,7 +36,7 @@ pub trait DepthSource: Send {
     /// [`DepthSource::read`] if that is called at all. The default does nothing, since most depth maps match the
     /// picture as it is.
     fn rectify(&mut self, color: &mut ColorImage) {
-        let _ = color;
+        self.inner_mut().into_iter().for_each(|inner| inner.rectify(color));
     }
 
     /// Writes the depth of the frame `seen` into `map`, which is resized to fit.
@@ -48,47 +48,60 @@ pub trait DepthSource: Send {
     /// Returns the relative cost of a map at each effort level, ascending; the last and finest level is 1. A source
     /// without a choice has one level.
     fn efforts(&self) -> &'static [f64] {
-        &[1.0]
+        self.inner().map_or(&[1.0], |inner| inner.efforts())
     }
 
     /// Sets the effort level, an index into [`DepthSource::efforts`], from the next map on. The initial level is the
     /// finest.
     fn set_effort(&mut self, effort: usize) {
-        let _ = effort;
+        self.inner_mut().into_iter().for_each(|inner| inner.set_effort(effort));
     }
 
     /// Whether later frames may reuse a map, warped by the picture's motion. False for maps whose outlines come from a
     /// mask: a mask is valid for its own frame only, and the person it shows is what moves most.
     fn is_reusable(&self) -> bool {
-        true
+        self.inner().is_none_or(|inner| inner.is_reusable())
     }
 
     /// Whether the maps already contain the background behind the nearer surface, which makes a background memory
     /// unnecessary.
     fn knows_background(&self) -> bool {
-        false
+        self.inner().is_some_and(|inner| inner.knows_background())
     }
 
     /// Sets whether the lens focuses on persons, from the next map on. If not, the source may skip person detection.
     fn set_focus_on_persons(&mut self, on: bool) {
-        let _ = on;
+        self.inner_mut().into_iter().for_each(|inner| inner.set_focus_on_persons(on));
     }
 
     /// Sets whether the source may return the map of an earlier picture for one that hardly differs. The initial state
     /// is that it may not.
     fn set_reuse(&mut self, on: bool) {
-        let _ = on;
+        self.inner_mut().into_iter().for_each(|inner| inner.set_reuse(on));
     }
 
     /// Handles a seek in the source: from now on, the source's own time is ahead of media time by `ahead_ns`
     /// nanoseconds, and the scene may be a different one.
     fn seek(&mut self, ahead_ns: i64) {
-        let _ = ahead_ns;
+        self.inner_mut().into_iter().for_each(|inner| inner.seek(ahead_ns));
     }
 
     /// Releases the device, if there is one, until the next [`DepthSource::read`]. Called when no frame came for a
     /// while.
-    fn suspend(&mut self) {}
+    fn suspend(&mut self) {
+        self.inner_mut().into_iter().for_each(|inner| inner.suspend());
+    }
+
+    /// Returns the source whose maps this one changes, if it does: methods without an implementation are then those of
+    /// that source.
+    fn inner(&self) -> Option<&dyn DepthSource> {
+        None
+    }
+
+    /// Returns [`DepthSource::inner`] to be changed.
+    fn inner_mut(&mut self) -> Option<&mut dyn DepthSource> {
+        None
+    }
 }
 
 /// The part of a frame that its depth may depend on.

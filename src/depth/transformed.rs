@@ -43,36 +43,12 @@ impl DepthSource for TransformedDepth {
         Ok(())
     }
 
-    fn efforts(&self) -> &'static [f64] {
-        self.source.efforts()
+    fn inner(&self) -> Option<&dyn DepthSource> {
+        Some(&*self.source)
     }
 
-    fn set_effort(&mut self, effort: usize) {
-        self.source.set_effort(effort);
-    }
-
-    fn is_reusable(&self) -> bool {
-        self.source.is_reusable()
-    }
-
-    fn knows_background(&self) -> bool {
-        self.source.knows_background()
-    }
-
-    fn set_focus_on_persons(&mut self, on: bool) {
-        self.source.set_focus_on_persons(on);
-    }
-
-    fn set_reuse(&mut self, on: bool) {
-        self.source.set_reuse(on);
-    }
-
-    fn seek(&mut self, ahead_ns: i64) {
-        self.source.seek(ahead_ns);
-    }
-
-    fn suspend(&mut self) {
-        self.source.suspend();
+    fn inner_mut(&mut self) -> Option<&mut dyn DepthSource> {
+        Some(&mut *self.source)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::depth::dilation::dilate;
 use crate::depth::plate::Companion;
 use crate::depth::{DepthError, DepthSource, FrameInput};
-use crate::frame::{ColorImage, DepthMap, Mask};
+use crate::frame::{DepthMap, Mask};
 
 /// Interval of the person detection in media time; in between, the last mask is used on the new maps.
 const DETECTION_INTERVAL_NS: u64 = 200_000_000;
@@ -146,8 +146,12 @@ impl PersonFocus {
 }
 
 impl DepthSource for PersonFocus {
-    fn rectify(&mut self, color: &mut ColorImage) {
-        self.depth.rectify(color);
+    fn inner(&self) -> Option<&dyn DepthSource> {
+        Some(&*self.depth)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn DepthSource> {
+        Some(&mut *self.depth)
     }
 
     fn read(&mut self, seen: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
@@ -159,22 +163,6 @@ impl DepthSource for PersonFocus {
             self.persons.set_person_distance(seen, map);
         }
         Ok(())
-    }
-
-    fn efforts(&self) -> &'static [f64] {
-        self.depth.efforts()
-    }
-
-    fn set_effort(&mut self, effort: usize) {
-        self.depth.set_effort(effort);
-    }
-
-    fn is_reusable(&self) -> bool {
-        self.depth.is_reusable()
-    }
-
-    fn knows_background(&self) -> bool {
-        self.depth.knows_background()
     }
 
     fn set_focus_on_persons(&mut self, on: bool) {
@@ -191,17 +179,13 @@ impl DepthSource for PersonFocus {
         self.persons.detector.seek(ahead_ns);
         self.depth.seek(ahead_ns);
     }
-
-    fn suspend(&mut self) {
-        self.depth.suspend();
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::depth::focus::{Focus, FocusRule};
-    use crate::frame::Stamp;
+    use crate::frame::{ColorImage, Stamp};
 
     /// A room at 4 m, a shelf at 0.8 m in the middle third of the picture, and a person at 1.6 m on the left, behind a
     /// table that masks include.
