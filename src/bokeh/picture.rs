@@ -53,9 +53,4 @@ impl Picture {
     pub fn yuyv_mut(&mut self) -> Option<&mut YuyvImage> {
         self.yuyv.as_deref_mut()
     }
-
-    /// Returns the picture's buffer if it is in memory.
-    pub fn into_memory(self) -> Option<Pooled<ColorImage>> {
-        self.in_memory.then_some(self.image)
-    }
 }

@@ -122,11 +122,6 @@ impl FourCc {
         TABLE.iter().find(|&&(fourcc, _)| fourcc == self).map(|&(_, family)| family)
     }
 
-    /// Returns whether the format is supported.
-    pub fn is_supported(self) -> bool {
-        self.family().is_some()
-    }
-
     /// Returns whether the format is supported and uncompressed.
     pub fn is_raw(self) -> bool {
         self.family().is_some_and(|family| family != Family::Jpeg)
@@ -135,17 +130,6 @@ impl FourCc {
     /// Returns the content of its pictures; `None` if the format is not supported.
     pub fn content(self) -> Option<Content> {
         self.family().map(|family| if family == Family::Depth16 { Content::Depth } else { Content::Color })
-    }
-
-    /// Returns the mean bits per pixel; `None` for compressed and unsupported formats.
-    pub fn bits_per_px(self) -> Option<u32> {
-        Some(match self.family()? {
-            Family::Packed422 { .. } | Family::Depth16 => 16,
-            Family::SemiPlanar420 { .. } | Family::Planar420 { .. } => 12,
-            Family::Rgb24 { .. } => 24,
-            Family::Grey => 8,
-            Family::Jpeg => return None,
-        })
     }
 }
 
