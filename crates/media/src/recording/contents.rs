@@ -106,6 +106,13 @@ pub(super) trait Container: Debug + Send + Sync {
     }
 }
 
+/// Warns that a recording's file has faults.
+pub(super) fn warn_of_damage(name: &str, damage: Option<&str>) {
+    if let Some(damage) = damage {
+        tracing::warn!("{name}: damaged: {damage}; what is whole is played");
+    }
+}
+
 /// A colour picture in a recording's file.
 pub(super) enum StoredColor<'a> {
     /// A PNG or JPEG.

@@ -32,6 +32,15 @@ pub struct Options {
     pub keep_going: bool,
 }
 
+impl Options {
+    /// Warns that the depth of recording `name`, if it has any, is no inverse depth.
+    pub(super) fn warn_of_inverse_unit(&self, name: &str, has_depth: bool) {
+        if self.depth_unit == DepthUnit::Inverse && has_depth {
+            tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
+        }
+    }
+}
+
 impl Default for Options {
     /// Pairs within 20 ms, as in the TUM benchmark. Faulty lists and links to the outside are rejected.
     fn default() -> Self {

@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
+use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, warn_of_damage};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
-use super::{DepthUnit, Options, Unpaired, depth_covers, pair, timeline};
+use super::{Options, Unpaired, depth_covers, pair, timeline};
 use crate::files::input;
 use bokehcam::calibration::registration::RgbdCalibration;
 use file::KinectFile;
@@ -72,9 +72,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let found = scan::scan(&file, &name).map_err(RecordingError::io("read the recording", path))?;
     let (color, color_format) = find_color(&found).map_err(fault)?;
     let colors = color.in_order();
-    if let Some(damage) = &found.damage {
-        tracing::warn!("{name}: damaged: {damage}; what is whole is played");
-    }
+    warn_of_damage(&name, found.damage.as_deref());
     let depth = found.track(DEPTH).filter(|track| track.is_grey16() && !track.blocks.is_empty());
     if depth.is_none() {
         let mode = found.tag("K4A_DEPTH_MODE").map_or(String::new(), |mode| format!(" ({})", mode.escape_debug()));
@@ -96,10 +94,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
             "{name} {reason}: depth is taken as if it had the view of the colour camera (--depth-calibration)"
         );
     }
-    if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
-        tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
-    }
-
+    options.warn_of_inverse_unit(&name, depth.is_some());
     let source = |track: &str, at: usize| PictureSource::from_path(format!("{track}, frame {at}").into());
     let listed = frames.iter().enumerate().map(|(at, (color, depth))| ListedFrame {
         time_ns: Some(found.time_ns(color.ticks)),

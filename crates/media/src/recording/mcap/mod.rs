@@ -18,10 +18,10 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
+use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, warn_of_damage};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
-use super::{DepthUnit, Options, Unpaired, pair, timeline};
+use super::{Options, Unpaired, pair, timeline};
 use crate::files::input;
 use bokehcam::calibration::registration::RgbdCalibration;
 use chunk::ChunkCache;
@@ -105,19 +105,14 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         .map_err(|what| fault(format!("{what}{}", ending())))?;
     let [color, depth] = [Some(choice.color), choice.depth].map(|at| at.map(|at| &found.topics[at]));
     let Some(color) = color else { return Err(fault("it has no pictures".to_owned())) };
-    if let Some(damage) = &found.damage {
-        tracing::warn!("{name}: damaged: {damage}; what is whole is played");
-    }
+    warn_of_damage(&name, found.damage.as_deref());
     if choice.is_guess {
         let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
         tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
     }
     let registered = depth.filter(|_| options.depth_calibration.is_none());
     let depth_calibration = registered.and_then(|depth| find_calibration(&found, &name, depth, color));
-    if options.depth_unit == DepthUnit::Inverse && depth.is_some() {
-        tracing::warn!("without effect here: --depth-unit inverse (the depth of {name} is distances)");
-    }
-
+    options.warn_of_inverse_unit(&name, depth.is_some());
     let (colors, frames, unpaired) = pair_frames(color, depth);
     if frames.is_empty() {
         let depth = depth.map_or(String::new(), |depth| depth.to_string());
@@ -134,10 +129,8 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     });
     let listed = listed.collect();
     let given = options.depth_unit.units_per_m().or(options.depth_scale);
-    let units = DepthUnits {
-        scale: given.unwrap_or(DEPTH_SCALE),
-        invalid: options.depth_invalid.filter(|&invalid| invalid != 0),
-    };
+    let invalid = options.depth_invalid.filter(|&invalid| invalid != 0);
+    let units = DepthUnits { scale: given.unwrap_or(DEPTH_SCALE), invalid };
     let depth_format = depth.map(|depth| match given {
         Some(_) if !depth.has_metres() => DepthFormat::Units(units),
         _ => DepthFormat::StatedUnits(units),
