@@ -81,12 +81,8 @@ impl WithSimd for MarkSilhouettes<'_> {
                 }
                 for x in (0..take).filter(|&x| excess_step_px[x] >= 0.0) {
                     for other in [here[x + 1], below[x]] {
-                        mark_cell(
-                            row,
-                            across,
-                            x0 + x,
-                            Silhouette::between(here[x], other, min_step_px, self.near_from_px),
-                        );
+                        let silhouette = Silhouette::between(here[x], other, min_step_px, self.near_from_px);
+                        mark_cell(row, across, x0 + x, silhouette);
                     }
                 }
             }

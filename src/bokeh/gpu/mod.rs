@@ -93,6 +93,15 @@ impl GpuBokeh {
         (self.plan.width as u32, self.plan.height as u32)
     }
 
+    fn check_job(&self, job: &Job) -> Result<(), BokehError> {
+        let (made_for, got) = (self.size(), job.color.size());
+        match job.coc {
+            _ if got != made_for => Err(BokehError::Size { made_for, got }),
+            CocField::Depth(_) if job.depth.is_none() => Err(BokehError::NoDepth),
+            _ => Ok(()),
+        }
+    }
+
     /// Uploads the depth map of a job, if its CoC follows it; returns it instead if it is on the device already.
     fn upload_depth<'a>(&mut self, job: &Job, shared: Option<&'a DeviceFrame>) -> Option<&'a wgpu::Buffer> {
         let (CocField::Depth(_), Some(map)) = (job.coc, &job.depth) else { return None };
@@ -166,15 +175,21 @@ fn max_coc_px(coc: &CocField) -> f32 {
     max_px.max(1e-3)
 }
 
+/// Resizes the pictures that a job may be written to, and drops the one in YUYV if it cannot be.
+fn resize_outputs(job: &mut Job, (width, height): (u32, u32)) {
+    job.out.resize(width, height);
+    // YUYV shares chroma between two pixels of a row.
+    if job.place != PictureLocation::Memory || !width.is_multiple_of(2) {
+        job.yuyv = None;
+    }
+    if let Some(yuyv) = &mut job.yuyv {
+        yuyv.resize(width, height);
+    }
+}
+
 impl Bokeh for GpuBokeh {
     fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        let made_for = self.size();
-        if job.color.size() != made_for {
-            return Err(BokehError::Size { made_for, got: job.color.size() });
-        }
-        if matches!(job.coc, CocField::Depth(_)) && job.depth.is_none() {
-            return Err(BokehError::NoDepth);
-        }
+        self.check_job(&job)?;
         if let Err(error) = self.device.check() {
             self.refused = Some(job);
             return Err(error.into());
@@ -184,15 +199,8 @@ impl Bokeh for GpuBokeh {
         };
         let started = Instant::now();
         let on_device = self.take_device_picture(job.place);
-        job.out.resize(made_for.0, made_for.1);
-        // YUYV shares chroma between two pixels of a row.
-        if job.place != PictureLocation::Memory || !made_for.0.is_multiple_of(2) {
-            job.yuyv = None;
-        }
-        if let Some(yuyv) = &mut job.yuyv {
-            yuyv.resize(made_for.0, made_for.1);
-        }
-        let is_here = |frame: &Pooled<DeviceFrame>| frame.is_on(&self.device) && frame.size() == made_for;
+        resize_outputs(&mut job, self.size());
+        let is_here = |frame: &Pooled<DeviceFrame>| frame.is_on(&self.device) && frame.size() == self.size();
         // Kept until this frame is submitted: its buffers may be overwritten only afterwards.
         let shared = job.on_device.take().filter(is_here);
         let shared_metres = self.upload_depth(&job, shared.as_deref());
