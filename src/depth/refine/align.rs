@@ -84,8 +84,7 @@ impl Aligner {
         width: usize,
         depth_step: f32,
     ) {
-        let height = inverse.len() / width;
-        let bands = Bands::new(height, tiles::ROWS, workers);
+        let bands = Bands::new(inverse.len() / width, tiles::ROWS, workers);
         self.moved.clear();
         self.pixels.clear();
         for round in 0..ROUNDS {

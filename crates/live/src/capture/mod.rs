@@ -71,9 +71,7 @@ pub trait Camera: Send {
 
     /// Releases the device, if there is one, until [`Camera::next`] is called again: no client watches.
     fn suspend(&mut self) {
-        if let Some(inner) = self.inner() {
-            inner.suspend();
-        }
+        self.inner().into_iter().for_each(|inner| inner.suspend());
     }
 }
 

@@ -5,7 +5,7 @@
 
 use pulp::Simd;
 
-use super::{CELL_PX, Cluster, FRINGE, FrameView, Sums};
+use super::{CELL_PX, Cluster, FrameView, Sums};
 use crate::compute::simd::load;
 use crate::depth::bitmap::set_bits;
 use crate::depth::matting::symmetric::outer_product;
@@ -154,11 +154,12 @@ pub fn cluster_cell<S: Simd>(simd: S, view: &FrameView, column: usize, row: usiz
         far[k] = if is_far { weight } else { 0.0 };
     }
     let far = if is_one { Cluster::default() } else { samples.compute_cluster(&far, corner) };
-    let mut clusters = [samples.compute_cluster(&near, corner), far, Cluster::default()];
-    if all.0 - all.1 > depth_step {
-        clusters[FRINGE] = cluster_fringe(view, &values, edges, 0.5 * (all.0 + all.1), corner);
-    }
-    clusters
+    let near = samples.compute_cluster(&near, corner);
+    let fringe = match all.0 - all.1 > depth_step {
+        true => cluster_fringe(view, &values, edges, 0.5 * (all.0 + all.1), corner),
+        false => Cluster::default(),
+    };
+    [near, far, fringe]
 }
 
 /// Computes the cluster of the pixels at `edges` that have more than the inverse depth `middle`.

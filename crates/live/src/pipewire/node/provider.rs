@@ -190,17 +190,22 @@ impl Provider {
                 self.report_ready(ready.take());
             }
             if self.next_timeout().is_some_and(|timeout| timeout.is_zero()) {
-                if self.is_streaming.get() {
-                    // Only the loop delivers pictures, so it has to be woken.
-                    self.repeat.set(true);
-                    self.since_ns.set(self.clock.now_ns());
-                    waker.wake();
-                } else {
-                    self.set_watched(false);
-                }
+                self.handle_timeout(waker);
             }
         }
         Ok(())
+    }
+
+    /// Repeats the last picture for the readers, or notes that there are none any more.
+    fn handle_timeout(&self, waker: &Waker) {
+        if self.is_streaming.get() {
+            // Only the loop delivers pictures, so it has to be woken.
+            self.repeat.set(true);
+            self.since_ns.set(self.clock.now_ns());
+            waker.wake();
+        } else {
+            self.set_watched(false);
+        }
     }
 
     fn create_stream(&self, session: &Session) -> Result<StreamRc, PipeWireError> {
