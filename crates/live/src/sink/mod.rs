@@ -59,6 +59,9 @@ pub enum Ending {
     Truncated,
 }
 
+/// Result of writing a picture: `Break` if the reader at the other end has gone.
+pub type Written = Result<ControlFlow<()>, SinkError>;
+
 /// Receives finished frames, in order.
 ///
 /// Dropping a sink without [`Sink::finish`] aborts its output: no file gets its name, but frames already written are
@@ -69,7 +72,7 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// The frame could not be written. A file then accepts no more; its content is kept, and the error says where.
-    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Written;
 
     /// Whether pictures should come through [`Sink::write_yuyv`] from now on, where that is cheap. Pictures in flight
     /// still arrive in the earlier form, so a sink that has once returned true must accept both from then on.
@@ -82,14 +85,14 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// Those of [`Sink::write_frame`]; the sink never wanted YUYV.
-    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Written {
         let _ = (frame, time_ns);
         Err(SinkError::Yuyv)
     }
 
     /// Whether it keeps the alpha channel of [`Sink::write_with_alpha`].
     fn keeps_alpha(&self) -> bool {
-        false
+        self.inner().is_some_and(|inner| inner.keeps_alpha())
     }
 
     /// Writes a picture with straight colours and an alpha channel, one byte per pixel row by row, 255 opaque, like
@@ -97,12 +100,7 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// Those of [`Sink::write_frame`]; the sink keeps no alpha.
-    fn write_with_alpha(
-        &mut self,
-        frame: &ColorImage,
-        alpha: &[u8],
-        time_ns: u64,
-    ) -> Result<ControlFlow<()>, SinkError> {
+    fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
         let _ = (frame, alpha, time_ns);
         Err(SinkError::Alpha)
     }
@@ -110,7 +108,7 @@ pub trait Sink: Send {
     /// Sets the capture time, by the clock of the run, of the frame in the next [`Sink::write_frame`] or [`Sink::write_yuyv`]:
     /// for outputs that pass it on.
     fn set_capture_time(&mut self, captured_ns: u64) {
-        let _ = captured_ns;
+        self.inner_mut().into_iter().for_each(|inner| inner.set_capture_time(captured_ns));
     }
 
     /// Longest time that a live output may go without a picture; whenever it has passed, [`Sink::repeat_frame`] is called.
@@ -133,7 +131,7 @@ pub trait Sink: Send {
     ///
     /// # Errors
     /// Those of [`Sink::write_frame`].
-    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Written {
         self.write_frame(card, time_ns)
     }
 
@@ -143,27 +141,38 @@ pub trait Sink: Send {
     /// Whether frames currently reach an output. While they do not, a frame counts as delivered once a preview shows
     /// it.
     fn has_outputs(&self) -> bool {
-        true
+        self.inner().is_none_or(|inner| inner.has_outputs())
     }
 
     /// Whether its pictures are seen as they come, like those of a virtual camera.
     fn is_live(&self) -> bool {
-        false
+        self.inner().is_some_and(|inner| inner.is_live())
     }
 
     /// Lists outputs that [`Sink::write_card`] has sent the card, and that have not shown it yet.
     fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
-        Vec::new()
+        self.inner().map_or_else(Vec::new, |inner| inner.outputs_without_card())
     }
 
     /// Returns the counters of frames sent to PipeWire cameras.
     fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
-        Vec::new()
+        self.inner().map_or_else(Vec::new, |inner| inner.node_counters())
     }
 
     /// Returns the counters of outputs that get their frames asynchronously.
     fn output_counters(&self) -> Vec<Counter<OutputCounts>> {
-        Vec::new()
+        self.inner().map_or_else(Vec::new, |inner| inner.output_counters())
+    }
+
+    /// Returns the sink that this one passes pictures on to, if it does: what it does not answer itself, that sink
+    /// does.
+    fn inner(&self) -> Option<&dyn Sink> {
+        None
+    }
+
+    /// Returns [`Sink::inner`] to be changed.
+    fn inner_mut(&mut self) -> Option<&mut dyn Sink> {
+        None
     }
 
     /// Completes the output after the last frame. A truncated one replaces nothing.
@@ -203,7 +212,7 @@ pub struct OutputWithoutCard {
 pub struct Null;
 
 impl Sink for Null {
-    fn write_frame(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, _: &ColorImage, _: u64) -> Written {
         Ok(ControlFlow::Continue(()))
     }
 
@@ -211,7 +220,7 @@ impl Sink for Null {
         true
     }
 
-    fn write_with_alpha(&mut self, _: &ColorImage, _: &[u8], _: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_with_alpha(&mut self, _: &ColorImage, _: &[u8], _: u64) -> Written {
         Ok(ControlFlow::Continue(()))
     }
 

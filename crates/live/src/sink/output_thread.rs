@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{io, mem};
 
-use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
+use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError, Written};
 use crate::stats::{NodeCounts, OutputCounts};
 use bokehcam::compute::panic_message;
 use bokehcam::frame::ColorImage;
@@ -249,12 +249,7 @@ fn serve_sink(
     }
 }
 
-fn write_picture(
-    sink: &mut dyn Sink,
-    picture: &Picture,
-    fit: Option<&mut Fit>,
-    shared: &Shared,
-) -> Result<ControlFlow<()>, SinkError> {
+fn write_picture(sink: &mut dyn Sink, picture: &Picture, fit: Option<&mut Fit>, shared: &Shared) -> Written {
     let Picture { image, alpha, time_ns, captured_ns, is_card } = picture;
     sink.set_capture_time(*captured_ns);
     let fitted = fit.map_or(image, |fit| fit.apply(image));

@@ -12,14 +12,12 @@ use std::time::{Duration, Instant};
 use control::Request;
 pub use control::{CardNotShown, ShutterControl};
 
-use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError, card};
-use crate::stats::{NodeCounts, OutputCounts};
+use super::{Ending, OutputWithoutCard, Sink, SinkError, Written, card};
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, YuyvImage};
 use bokehcam::link::demand::Demand;
 
 /// Result of writing a picture ([`Sink::write_frame`]).
-type Written = Result<ControlFlow<()>, SinkError>;
 
 /// A sink whose pictures can be blocked through its [`ShutterControl`]. The card is shown at once, also between two frames;
 /// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
@@ -227,8 +225,12 @@ impl Sink for Shutter {
         self.send_picture(time_ns, |shutter, time_ns| shutter.sink.write_yuyv(frame, time_ns))
     }
 
-    fn keeps_alpha(&self) -> bool {
-        self.sink.keeps_alpha()
+    fn inner(&self) -> Option<&dyn Sink> {
+        Some(&*self.sink)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
     }
 
     fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
@@ -240,26 +242,6 @@ impl Sink for Shutter {
 
     fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Written {
         self.sink.write_card(card, time_ns)
-    }
-
-    fn set_capture_time(&mut self, captured_ns: u64) {
-        self.sink.set_capture_time(captured_ns);
-    }
-
-    fn is_live(&self) -> bool {
-        self.sink.is_live()
-    }
-
-    fn outputs_without_card(&self) -> Vec<OutputWithoutCard> {
-        self.sink.outputs_without_card()
-    }
-
-    fn node_counters(&self) -> Vec<Counter<NodeCounts>> {
-        self.sink.node_counters()
-    }
-
-    fn output_counters(&self) -> Vec<Counter<OutputCounts>> {
-        self.sink.output_counters()
     }
 
     /// Waits until the sink or the card is due, but at most a tick: it may be closed meanwhile.
@@ -291,10 +273,6 @@ impl Sink for Shutter {
         self.shows_card = self.closed.load(Ordering::Acquire);
         self.update_demand();
         self.sink.skip_frame();
-    }
-
-    fn has_outputs(&self) -> bool {
-        self.sink.has_outputs()
     }
 
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::output_thread::{Backpressure, Outcome, OutputThread, PicturePool};
 use super::tee_control::{MemberEvent, Request, TeeControl};
-use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError};
+use super::{Counter, Ending, OutputWithoutCard, Sink, SinkError, Written};
 use crate::stats::{NodeCounts, OutputCounts};
 use bokehcam::frame::ColorImage;
 
@@ -149,12 +149,7 @@ impl Tee {
     }
 
     /// Sends a picture to each output, with its alpha channel if that is not empty.
-    fn send_frame(
-        &mut self,
-        frame: (&ColorImage, &[u8]),
-        time_ns: u64,
-        is_card: bool,
-    ) -> Result<ControlFlow<()>, SinkError> {
+    fn send_frame(&mut self, frame: (&ColorImage, &[u8]), time_ns: u64, is_card: bool) -> Written {
         self.handle_requests();
         if !self.outputs.is_empty() {
             let picture = self.picture_pool.copy_frame(frame, (time_ns, self.captured_ns), is_card);
@@ -175,7 +170,7 @@ impl Tee {
 
     /// Removes outputs that have ended, unless a control manages them. Returns `Break` if none accepts frames any
     /// more.
-    fn remove_ended(&mut self) -> Result<ControlFlow<()>, SinkError> {
+    fn remove_ended(&mut self) -> Written {
         if self.requests.is_some() {
             return Ok(ControlFlow::Continue(()));
         }
@@ -231,11 +226,11 @@ impl Tee {
 }
 
 impl Sink for Tee {
-    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Written {
         self.send_frame((frame, &[]), time_ns, false)
     }
 
-    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_card(&mut self, card: &ColorImage, time_ns: u64) -> Written {
         self.send_frame((card, &[]), time_ns, true)
     }
 
@@ -244,12 +239,7 @@ impl Sink for Tee {
         !self.outputs.is_empty() && self.outputs.iter().all(|member| member.output.keeps_alpha)
     }
 
-    fn write_with_alpha(
-        &mut self,
-        frame: &ColorImage,
-        alpha: &[u8],
-        time_ns: u64,
-    ) -> Result<ControlFlow<()>, SinkError> {
+    fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
         self.send_frame((frame, alpha), time_ns, false)
     }
 

@@ -16,7 +16,7 @@ use self::command::Format;
 use self::raw::RawVideo;
 use super::output::OutputFile;
 use super::pipe::Pipe;
-use super::{Ending, Options, Sink, SinkError, Sound, check_size};
+use super::{Ending, Options, Sink, SinkError, Sound, Written, check_size};
 use bokehcam::frame::ColorImage;
 use bokehcam_media::files::atomic_file::PartFile;
 use bokehcam_media::video::process::{Process, ProcessEnd};
@@ -123,7 +123,7 @@ impl Ffmpeg {
     }
 
     /// Writes a frame; without an alpha channel, it is opaque.
-    fn write(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
         check_size(self.size, frame.size())?;
         let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
         if let Err(error) = self.output.check_exists() {
@@ -173,7 +173,7 @@ fn check_outcome(ended: io::Result<ProcessEnd>, path: &Path, part: &Path) -> Res
 }
 
 impl Sink for Ffmpeg {
-    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+    fn write_frame(&mut self, frame: &ColorImage, time_ns: u64) -> Written {
         self.write(frame, &[], time_ns)
     }
 
@@ -181,12 +181,7 @@ impl Sink for Ffmpeg {
         self.input.as_ref().is_some_and(RawVideo::has_alpha)
     }
 
-    fn write_with_alpha(
-        &mut self,
-        frame: &ColorImage,
-        alpha: &[u8],
-        time_ns: u64,
-    ) -> Result<ControlFlow<()>, SinkError> {
+    fn write_with_alpha(&mut self, frame: &ColorImage, alpha: &[u8], time_ns: u64) -> Written {
         self.write(frame, alpha, time_ns)
     }
 
