@@ -10,7 +10,7 @@ use super::coded::EncodedPicture;
 use super::decode::{self, DepthUnits, Scratch};
 use super::decoders::check_size;
 use super::error::RecordingError;
-use super::fault::{LineFault, PictureFault};
+use super::fault::{LineFault, PictureFault, ReadResult};
 use super::raw_image::{self, RawImage};
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
 use bokehcam::calibration::registration::RgbdCalibration;
@@ -63,20 +63,14 @@ pub(super) struct Contents {
 /// read at once.
 pub(super) trait Container: Debug + Send + Sync {
     /// Reads a colour picture as it is stored, into `bytes`.
-    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault>;
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> ReadResult<StoredColor<'a>>;
 
     /// Reads depth in metres, 0 = unknown. Rejects a map that does not cover the view of a picture of `size`: that of the
     /// colour camera, or of the depth camera if there is a calibration.
-    fn read_depth(
-        &self,
-        frame: usize,
-        size: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut DepthMap,
-    ) -> Result<(), PictureFault>;
+    fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult;
 
     /// Reads width and height of a colour picture.
-    fn read_size(&self, frame: usize) -> Result<(u32, u32), PictureFault> {
+    fn read_size(&self, frame: usize) -> ReadResult<(u32, u32)> {
         let size = match self.read_stored_color(frame, &mut Vec::new())? {
             StoredColor::Encoded(data) => EncodedPicture::open_bytes(data)?.size(),
             StoredColor::Raw(image) | StoredColor::Nv12(image) => image.size,
@@ -91,7 +85,7 @@ pub(super) trait Container: Debug + Send + Sync {
         expected: (u32, u32),
         scratch: &mut Scratch,
         into: &mut ColorImage,
-    ) -> Result<(), PictureFault> {
+    ) -> ReadResult {
         match self.read_stored_color(frame, &mut scratch.file)? {
             StoredColor::Encoded(data) => {
                 let coded = EncodedPicture::open_bytes(data)?;
@@ -274,7 +268,7 @@ pub(super) fn read_first_size<'a>(
     folder: &RecordingFolder,
     container: Option<&dyn Container>,
     colors: impl Iterator<Item = &'a PictureSource>,
-    read_size: fn(&Path) -> Result<(u32, u32), PictureFault>,
+    read_size: fn(&Path) -> ReadResult<(u32, u32)>,
 ) -> Result<(u32, u32), RecordingError> {
     let (mut first_error, mut locator) = (None, Locator::new(folder));
     // A list may name an unreadable file many times: open it once.

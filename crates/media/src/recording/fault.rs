@@ -82,6 +82,9 @@ pub enum GeometryFault {
     },
 }
 
+/// Result of reading a picture.
+pub(super) type ReadResult<T = ()> = Result<T, PictureFault>;
+
 /// A fault in a picture file.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]

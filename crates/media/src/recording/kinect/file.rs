@@ -7,7 +7,7 @@ use super::track::{Block, ColorFormat};
 use crate::recording::contents::{Container, StoredColor};
 use crate::recording::decode::{DepthUnits, Scratch};
 use crate::recording::depth_covers;
-use crate::recording::fault::PictureFault;
+use crate::recording::fault::{PictureFault, ReadResult};
 use crate::recording::raw_image::{self, DepthSamples, RawImage};
 use bokehcam::frame::DepthMap;
 
@@ -27,7 +27,7 @@ pub(super) struct KinectFile {
 }
 
 impl KinectFile {
-    fn read<'a>(&self, block: Block, bytes: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
+    fn read<'a>(&self, block: Block, bytes: &'a mut Vec<u8>) -> ReadResult<&'a [u8]> {
         bytes.resize(block.length as usize, 0);
         self.file.read_exact_at(bytes, block.at)?;
         Ok(bytes)
@@ -35,7 +35,7 @@ impl KinectFile {
 }
 
 impl Container for KinectFile {
-    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> ReadResult<StoredColor<'a>> {
         let data = self.read(self.frames[frame].0, bytes)?;
         let (size, width) = (self.color_size, self.color_size.0 as usize);
         let raw = |format, stride_bytes| RawImage { size, format, is_big_endian: false, stride_bytes, data };
@@ -46,13 +46,7 @@ impl Container for KinectFile {
         })
     }
 
-    fn read_depth(
-        &self,
-        frame: usize,
-        size: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut DepthMap,
-    ) -> Result<(), PictureFault> {
+    fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult {
         if let Some(reason) = self.uncalibrated.clone().filter(|_| !depth_covers(self.depth_size, size)) {
             return Err(PictureFault::Uncalibrated { found: self.depth_size, reason });
         }

@@ -82,12 +82,9 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     if frames.is_empty() {
         return Err(fault("no depth map in it was taken within half a frame of a colour picture".to_owned()));
     }
-    let calibration = match depth {
-        Some(depth) if options.depth_calibration.is_none() => {
-            read_calibration(&file, &found, depth.size, color.size).map(Some)
-        }
-        _ => Ok(None),
-    };
+    let uncalibrated = depth.filter(|_| options.depth_calibration.is_none());
+    let read = |depth: &Track| read_calibration(&file, &found, depth.size, color.size);
+    let calibration = uncalibrated.map(read).transpose();
     let depth_size = depth.map_or((0, 0), |depth| depth.size);
     if let (Err(reason), true) = (&calibration, depth_covers(depth_size, color.size)) {
         tracing::warn!(

@@ -10,7 +10,7 @@ use super::topic::{Message, Topic};
 use crate::recording::coded::EncodedPicture;
 use crate::recording::contents::{Container, StoredColor};
 use crate::recording::decode::{self, DepthUnits, Scratch};
-use crate::recording::fault::PictureFault;
+use crate::recording::fault::{PictureFault, ReadResult};
 use crate::recording::raw_image::{self, DepthSamples};
 use bokehcam::frame::DepthMap;
 
@@ -36,7 +36,7 @@ pub(super) struct McapFile {
 
 impl McapFile {
     /// Reads a message of colour or depth into `bytes`, and parses it.
-    fn read_picture<'a>(&self, topic: usize, at: usize, bytes: &'a mut Vec<u8>) -> Result<Picture<'a>, PictureFault> {
+    fn read_picture<'a>(&self, topic: usize, at: usize, bytes: &'a mut Vec<u8>) -> ReadResult<Picture<'a>> {
         let topic = &self.topics[topic];
         let Message { at, length, chunk, .. } = topic.messages[at];
         bytes.clear();
@@ -60,7 +60,7 @@ impl McapFile {
         frame: usize,
         is_depth: bool,
         bytes: &'a mut Vec<u8>,
-    ) -> Result<(Picture<'a>, &Topic), PictureFault> {
+    ) -> ReadResult<(Picture<'a>, &Topic)> {
         let (color, depth) = self.frames[frame];
         let message = if is_depth { depth } else { Some(color) };
         let (topic, message) = self.chosen[usize::from(is_depth)].zip(message).ok_or(PictureFault::Missing)?;
@@ -69,20 +69,14 @@ impl McapFile {
 }
 
 impl Container for McapFile {
-    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> ReadResult<StoredColor<'a>> {
         Ok(match self.read_frame(frame, false, bytes)?.0 {
             Picture::Image(image) => StoredColor::Raw(image),
             Picture::Compressed { data, .. } => StoredColor::Encoded(data),
         })
     }
 
-    fn read_depth(
-        &self,
-        frame: usize,
-        size: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut DepthMap,
-    ) -> Result<(), PictureFault> {
+    fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult {
         let (picture, topic) = self.read_frame(frame, true, &mut scratch.file)?;
         match picture {
             Picture::Image(image) => {

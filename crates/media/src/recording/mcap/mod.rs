@@ -135,13 +135,12 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         Some(_) if !depth.has_metres() => DepthFormat::Units(units),
         _ => DepthFormat::StatedUnits(units),
     });
-    let frames = frames.into_iter().map(|(at, depth_at)| (colors[at].1, depth_at)).collect();
     let container = McapFile {
         file,
         topics: found.topics,
         chunks: found.chunks,
         chosen: [Some(choice.color), choice.depth],
-        frames,
+        frames: frames.into_iter().map(|(at, depth_at)| (colors[at].1, depth_at)).collect(),
         units,
         cache: ChunkCache::default(),
     };

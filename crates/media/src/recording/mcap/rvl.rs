@@ -4,16 +4,11 @@
 
 use crate::recording::decode::{self, DepthUnits};
 use crate::recording::decoders::check_size;
-use crate::recording::fault::PictureFault;
+use crate::recording::fault::{PictureFault, ReadResult};
 use bokehcam::frame::DepthMap;
 
 /// Decodes a map to metres. Rejects one that does not cover a picture of `color` pixels.
-pub(super) fn decode_depth(
-    bytes: &[u8],
-    units: DepthUnits,
-    color: (u32, u32),
-    into: &mut DepthMap,
-) -> Result<(), PictureFault> {
+pub(super) fn decode_depth(bytes: &[u8], units: DepthUnits, color: (u32, u32), into: &mut DepthMap) -> ReadResult {
     let (sides, coded) = bytes.split_first_chunk::<8>().ok_or(PictureFault::Truncated)?;
     let [width, height] = [0, 4].map(|at| u32::from_le_bytes([sides[at], sides[at + 1], sides[at + 2], sides[at + 3]]));
     check_size(width, height)?;

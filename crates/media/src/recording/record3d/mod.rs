@@ -18,7 +18,7 @@ use super::contents::{
 use super::decode::{self, DepthUnits, Scratch};
 use super::decoders::{guard, guard_as};
 use super::error::RecordingError;
-use super::fault::{PictureFault, damaged_fault};
+use super::fault::{PictureFault, ReadResult, damaged_fault};
 use super::{MAX_ENTRIES, MAX_SIDE_PX, Options, Unpaired};
 use crate::files::input;
 use bokehcam::frame::DepthMap;
@@ -113,7 +113,7 @@ struct Archive {
 }
 
 impl Archive {
-    fn read<'a>(&self, name: &str, bytes: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
+    fn read<'a>(&self, name: &str, bytes: &'a mut Vec<u8>) -> ReadResult<&'a [u8]> {
         let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
         bytes.clear();
         guard(|| {
@@ -136,17 +136,11 @@ impl Archive {
 }
 
 impl Container for Archive {
-    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> Result<StoredColor<'a>, PictureFault> {
+    fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> ReadResult<StoredColor<'a>> {
         self.read(&self.frames[frame].0, bytes).map(StoredColor::Encoded)
     }
 
-    fn read_depth(
-        &self,
-        frame: usize,
-        size: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut DepthMap,
-    ) -> Result<(), PictureFault> {
+    fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult {
         let name = self.frames[frame].1.as_ref().ok_or(PictureFault::Missing)?;
         let coded = self.read(name, &mut scratch.file)?;
         scratch.pixels.clear();
