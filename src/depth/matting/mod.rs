@@ -219,9 +219,7 @@ impl Matting {
             return;
         }
         map.matte.pixels.clear();
-        let Self {
-            arch, light, at_edge, edge_detector, edges, pixels, clusters, evidence, wide, order, traced, ..
-        } = self;
+        let Self { arch, light, at_edge, edge_detector, edges, pixels, clusters, .. } = self;
         let arch = *arch;
         let size = (map.width as usize, map.height as usize);
         let fits = |depth_step: &f32| {
@@ -234,11 +232,35 @@ impl Matting {
         clusters.clear(size);
         pixels.clear();
         pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
-        let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
+        let (metres, rgb) = (&map.metres, &color.rgb[..]);
         clusters.fit_models((arch, workers), &FrameView { size, metres, depth_step, at_edge, rgb, light }, 0);
         // Without pure pixels of both surfaces, a colour says nothing about alpha.
         pixels.retain(|pixel| clusters.contrast(pixel.model).is_some());
         let on_edges = pixels.len();
+        self.trace_pixels(workers, (&*map, color), depth_step, background);
+        let Self { clusters, pixels, wide, order, traced, .. } = self;
+        wide.discard_wide(size, pixels);
+        sort_mixed(size.0, pixels, on_edges, (order, traced));
+
+        let each = bands::chunk_len(order.len(), MIN_PIXELS);
+        let found = &mut map.matte.pixels;
+        found.resize(order.len(), MixedPixel::default());
+        workers.run_each(order.chunks(each).zip(found.chunks_mut(each)), &|(order, mixed)| {
+            arch.dispatch(SeparateColors { clusters, width: size.0, pixels, order, mixed });
+        });
+    }
+
+    /// Evaluates the pixels at edges, and traces on, step by step, from those with some alpha.
+    fn trace_pixels(
+        &mut self,
+        workers: &mut ThreadPool,
+        (map, color): (&DepthMap, &ColorImage),
+        depth_step: f32,
+        background: Option<&KnownBackground>,
+    ) {
+        let Self { arch, light, at_edge, edges, pixels, clusters, evidence, wide, .. } = self;
+        let (arch, size) = (*arch, (map.width as usize, map.height as usize));
+        let (metres, rgb, most) = (&map.metres, &color.rgb[..], Matte::max_pixels(size.0, size.1));
         let (mut compared, mut marked) = (0..0, edges.len());
         wide.steps.clear();
         let (mut prior, mut steps) = (Prior::default(), 0);
@@ -274,14 +296,6 @@ impl Matting {
             }
             steps += 1;
         }
-        wide.discard_wide(size, pixels);
-        sort_mixed(size.0, pixels, on_edges, (order, traced));
-
-        let each = bands::chunk_len(order.len(), MIN_PIXELS);
-        matte.pixels.resize(order.len(), MixedPixel::default());
-        workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
-            arch.dispatch(SeparateColors { clusters, width: size.0, pixels, order, mixed });
-        });
     }
 }
 
