@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::frame::Frame;
 use super::pacer::Pacer;
 use super::{Shared, StageResult, Trace};
-use crate::capture::{self, Camera, Captured, FrameData, MAX_WAIT};
+use crate::capture::{self, Camera, CaptureError, Captured, FrameData, MAX_WAIT};
 use crate::stats::{DropCause, Histogram};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::link::Sender;
@@ -35,7 +35,7 @@ pub(super) struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     pub(super) fn new(
-        camera: Box<dyn Camera>,
+        mut camera: Box<dyn Camera>,
         demand: Option<Demand>,
         stop: &'a AtomicBool,
         shared: &'a Shared,
@@ -43,21 +43,45 @@ impl<'a> Stage<'a> {
     ) -> Self {
         let Shared { clock, info, realtime_period_ns, has_ended, .. } = shared;
         let pacer = Pacer::new(clock.clone(), realtime_period_ns.is_some() && !info.live, info.period_ns);
+        if let Some((seeker, demand)) = camera.seeker().zip(demand.as_ref()) {
+            seeker.set_demand(demand);
+        }
         Self { camera, pacer, demand, stop: [stop, has_ended], shared, times }
+    }
+
+    /// Suspends the camera for a moment if there are no viewers; returns whether it did.
+    fn pause(&mut self) -> bool {
+        let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) else { return false };
+        self.camera.suspend();
+        let pause_began_ns = self.shared.clock.now_ns();
+        demand.wait(MAX_WAIT);
+        self.pacer.shift_schedule(self.shared.clock.now_ns() - pause_began_ns);
+        true
+    }
+
+    /// Counts a frame that cannot be decoded, and warns of the first one.
+    ///
+    /// # Errors
+    /// Such frames end the run.
+    fn skip_corrupt(&self, error: CaptureError, has_warned: &mut bool) -> StageResult {
+        self.shared.counter.count_lost(1, DropCause::Corrupt);
+        if !self.shared.keep_going {
+            return Err(error.into());
+        }
+        if !std::mem::replace(has_warned, true) {
+            tracing::warn!("{error}; such frames are skipped");
+        }
+        Ok(())
     }
 
     /// Captures until the camera ends, a stop flag is set, or the output is closed.
     pub(super) fn run(mut self, mut to: Sender<Frame<CapturedFrame>>) -> StageResult {
-        let Shared { clock, counter, pools, info, keep_going, .. } = self.shared;
-        let frame_data = info.frame_data;
-        let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
+        let (Shared { clock, counter, pools, info, .. }, stop) = (self.shared, self.stop);
+        let stopped = || stop.iter().any(|stop| stop.load(Ordering::Relaxed));
         // Stand-ins for a camera that brings neither; they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
         let mut has_warned = false;
         let seeker = self.camera.seeker();
-        if let Some((seeker, demand)) = seeker.as_ref().zip(self.demand.as_ref()) {
-            seeker.set_demand(demand);
-        }
         let (mut seek, mut ahead_ns) = (0, 0);
         while !stopped() {
             let request = seeker.as_ref().and_then(|seeker| seeker.newer_request(seek));
@@ -65,17 +89,13 @@ impl<'a> Stage<'a> {
                 (seek, ahead_ns) = (request.number, self.camera.seek(request.position));
                 self.pacer.restart_schedule();
             // A seek is served even if there are no viewers; otherwise the camera pauses until one comes.
-            } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
-                self.camera.suspend();
-                let pause_began_ns = clock.now_ns();
-                demand.wait(MAX_WAIT);
-                self.pacer.shift_schedule(clock.now_ns() - pause_began_ns);
+            } else if self.pause() {
                 continue;
             }
             counter.count_lost(self.pacer.skip_late_frames(&mut *self.camera), DropCause::Driver);
             let mut color = pools.colors.take();
-            let mut depth = (frame_data == FrameData::Depth).then(|| pools.depths.take());
-            let mut right = (frame_data == FrameData::RightCamera).then(|| pools.rights.take());
+            let mut depth = (info.frame_data == FrameData::Depth).then(|| pools.depths.take());
+            let mut right = (info.frame_data == FrameData::RightCamera).then(|| pools.rights.take());
             let shot = capture::FrameBuffers {
                 color: &mut color,
                 depth: depth.as_deref_mut().unwrap_or(&mut no_depth),
@@ -108,16 +128,7 @@ impl<'a> Stage<'a> {
                         break;
                     }
                 }
-                Captured::Corrupt(error) => {
-                    counter.count_lost(1, DropCause::Corrupt);
-                    if !keep_going {
-                        return Err(error.into());
-                    }
-                    if !has_warned {
-                        tracing::warn!("{error}; such frames are skipped");
-                        has_warned = true;
-                    }
-                }
+                Captured::Corrupt(error) => self.skip_corrupt(error, &mut has_warned)?,
                 Captured::Lost(count, cause) => counter.count_lost(count, cause),
                 Captured::Waiting => {}
                 Captured::End => break,
