@@ -6,7 +6,7 @@ use image::metadata::Orientation;
 
 use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::upright::upright;
 use super::{Recording, coded, pfm};
@@ -35,11 +35,7 @@ impl Recording {
     ///
     /// # Errors
     /// A given calibration is invalid, or for pictures of another aspect.
-    pub(super) fn register_depth(
-        mut self,
-        calibration: Option<RgbdCalibration>,
-        is_given: bool,
-    ) -> Result<Self, RecordingError> {
+    pub(super) fn register_depth(mut self, calibration: Option<RgbdCalibration>, is_given: bool) -> Result<Self> {
         let Some(calibration) = calibration.filter(|_| self.has_depth() && !self.has_relative_depth()) else {
             return Ok(self);
         };
@@ -79,7 +75,7 @@ impl Recording {
     ///
     /// # Errors
     /// Same as for [`Recording::read_color`]; or the recording has no depth.
-    pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
+    pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<()> {
         let Some(registration) = &self.depth_registration else {
             return self.decode_depth(index, self.size, scratch, into);
         };
@@ -94,13 +90,7 @@ impl Recording {
 
     /// Reads the depth of frame `index` as it was recorded, of the view of pictures of `size`; of exactly this size if it
     /// is to be registered.
-    fn decode_depth(
-        &self,
-        index: usize,
-        size: (u32, u32),
-        scratch: &mut Scratch,
-        into: &mut DepthMap,
-    ) -> Result<(), RecordingError> {
+    fn decode_depth(&self, index: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> Result<()> {
         let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
         let form = self.depth.as_ref().ok_or_else(no_depth)?;
         let frame = self.frame(index)?;

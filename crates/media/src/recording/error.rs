@@ -7,6 +7,9 @@ use super::fault::{GeometryFault, LineFault, PictureFault};
 use crate::files::folder::FolderError;
 use bokehcam::calibration::CalibrationError;
 
+/// Result of reading or writing a recording or a picture.
+pub type Result<T, E = RecordingError> = std::result::Result<T, E>;
+
 /// An error in reading or writing a recording or a picture.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]

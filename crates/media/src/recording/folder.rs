@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use super::MAX_ENTRIES;
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 
 /// Endings of pictures.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
@@ -26,7 +26,7 @@ fn split_known<'a>(name: &'a str, endings: &[&str]) -> Option<(&'a str, &'a str)
 ///
 /// # Errors
 /// The folder cannot be listed, or contains more than [`MAX_ENTRIES`] of them.
-pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>, RecordingError> {
+pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
     find_files(folder, &ENDINGS, wanted)
 }
 
@@ -34,11 +34,7 @@ pub(super) fn find_pictures(folder: &Path, wanted: impl Fn(&str) -> bool) -> Res
 ///
 /// # Errors
 /// Same as for [`find_pictures`].
-pub(super) fn find_files(
-    folder: &Path,
-    endings: &[&str],
-    wanted: impl Fn(&str) -> bool,
-) -> Result<Vec<String>, RecordingError> {
+pub(super) fn find_files(folder: &Path, endings: &[&str], wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(RecordingError::io("list", folder))? {
         let Ok(name) = entry.map_err(RecordingError::io("list", folder))?.file_name().into_string() else { continue };
@@ -69,7 +65,7 @@ pub(super) fn has_files(folder: &Path, endings: &[&str], wanted: impl Fn(&str) -
 ///
 /// # Errors
 /// Same as for [`find_pictures`]; or there are no such pictures.
-pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
+pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>> {
     let is_number = |stem: &str| stem.bytes().all(|byte| byte.is_ascii_digit() || byte == b'_');
     let names = find_pictures(folder, is_number)?;
     if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
@@ -134,7 +130,7 @@ impl<'a> Pictures<'a> {
     }
 
     /// Returns their names in `dir`, in natural order.
-    pub(super) fn find_in(&self, dir: &Path) -> Result<Vec<String>, RecordingError> {
+    pub(super) fn find_in(&self, dir: &Path) -> Result<Vec<String>> {
         find_pictures(&dir.join(self.folder), |stem| self.middle(stem).is_some())
     }
 
@@ -165,7 +161,7 @@ pub(super) fn pair_by_name(
     dir: &Path,
     (color, names): (Pictures, Vec<String>),
     (depth, maps): (Pictures, Vec<String>),
-) -> Result<(Vec<(String, String)>, PairKey), RecordingError> {
+) -> Result<(Vec<(String, String)>, PairKey)> {
     let pair_by = |by| {
         let mut partners = index_by_key(dir, depth, &maps, by)?;
         // Numbers that occur twice must not take the first map that fits.
@@ -183,7 +179,7 @@ fn index_by_key<'a>(
     pictures: Pictures,
     names: &'a [String],
     by: PairKey,
-) -> Result<HashMap<String, &'a String>, RecordingError> {
+) -> Result<HashMap<String, &'a String>> {
     let mut index = HashMap::new();
     for name in names {
         let Some(key) = pictures.key(name, by) else { continue };

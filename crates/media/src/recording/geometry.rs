@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::GeometryFault;
 use crate::files::input;
 use bokehcam::optics::StereoRig;
@@ -26,10 +26,7 @@ pub(super) type GeometryError = (Option<u32>, GeometryFault);
 
 impl Geometry {
     /// Reads a calibration file in the format of `parse`.
-    pub(super) fn read_with(
-        file: &Path,
-        parse: impl Fn(&str) -> Result<Self, GeometryError>,
-    ) -> Result<Self, RecordingError> {
+    pub(super) fn read_with(file: &Path, parse: impl Fn(&str) -> Result<Self, GeometryError>) -> Result<Self> {
         let text = input::read_text(file, input::MAX_CALIBRATION_BYTES)
             .map_err(RecordingError::io("read the calibration", file))?;
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
@@ -39,7 +36,7 @@ impl Geometry {
     ///
     /// # Errors
     /// The pictures have another aspect ratio.
-    pub fn scaled_to(mut self, file: &Path, size: (u32, u32)) -> Result<Self, RecordingError> {
+    pub fn scaled_to(mut self, file: &Path, size: (u32, u32)) -> Result<Self> {
         let Some(of) = self.size.filter(|&of| of != size) else { return Ok(self) };
         let [width, height, of_width, of_height] = [size.0, size.1, of.0, of.1].map(u64::from);
         // Compare the aspect ratios by cross-multiplication, with a tolerance of one pixel.

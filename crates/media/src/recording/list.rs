@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::MAX_ENTRIES;
 use super::contents::{ListPosition, PictureSource};
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::LineFault;
 use super::timeline::MAX_LENGTH_NS;
 use crate::files::{atomic_file, input};
@@ -45,7 +45,7 @@ pub(super) fn read_list<T>(
     dir: &Path,
     list: &str,
     parse: impl Fn(ListPosition, Result<&str, LineFault>) -> T,
-) -> Result<Vec<T>, RecordingError> {
+) -> Result<Vec<T>> {
     let path = dir.join(list);
     let bytes = input::read(&path, input::MAX_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
     // The last line of an interrupted list may be cut.
@@ -61,10 +61,7 @@ pub(super) fn read_list<T>(
 }
 
 /// Returns the first faulty entry as an error.
-pub(super) fn refuse_faults<'a>(
-    dir: &Path,
-    mut entries: impl Iterator<Item = &'a Entry>,
-) -> Result<(), RecordingError> {
+pub(super) fn refuse_faults<'a>(dir: &Path, mut entries: impl Iterator<Item = &'a Entry>) -> Result<()> {
     entries.try_for_each(|entry| entry.source.file(dir).map(|_| ()))
 }
 

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::depth_file::{self, DepthFile, Distances};
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::folder::{find_files, has_files};
 use super::{LAYOUTS, pictures};
@@ -50,7 +50,7 @@ impl MapSequence {
         pictured: Pictured,
         played: Option<u64>,
         options: depth_file::Options,
-    ) -> Result<(Self, Vec<String>), RecordingError> {
+    ) -> Result<(Self, Vec<String>)> {
         let found = find_files(dir, &depth_file::EXTENSIONS, |_| true)?;
         let by_stem = match pictured {
             Pictured::Frames(_) => None,
@@ -94,7 +94,7 @@ impl MapSequence {
     /// # Errors
     /// Same as for [`depth_file::read`]; or the sequence has no such map, or its distances are of another kind than those
     /// of the first.
-    pub fn read(&self, index: usize, color: (u32, u32)) -> Result<DepthFile, RecordingError> {
+    pub fn read(&self, index: usize, color: (u32, u32)) -> Result<DepthFile> {
         self.read_by(index, |file| depth_file::read(file, &self.options, color))
     }
 
@@ -102,17 +102,13 @@ impl MapSequence {
     ///
     /// # Errors
     /// Same as for [`MapSequence::read`].
-    pub fn read_unfitted(&self, index: usize) -> Result<DepthFile, RecordingError> {
+    pub fn read_unfitted(&self, index: usize) -> Result<DepthFile> {
         self.read_by(index, |file| {
             depth_file::read_unfitted(file, &self.options).map_err(RecordingError::picture(file))
         })
     }
 
-    fn read_by(
-        &self,
-        index: usize,
-        read: impl Fn(&Path) -> Result<DepthFile, RecordingError>,
-    ) -> Result<DepthFile, RecordingError> {
+    fn read_by(&self, index: usize, read: impl Fn(&Path) -> Result<DepthFile>) -> Result<DepthFile> {
         let count = self.files.len() as u64;
         let file = self.files.get(index).ok_or_else(|| map_count(&self.dir, count, index as u64 + 1))?;
         let map = read(file)?;
@@ -130,12 +126,7 @@ fn map_count(dir: &Path, maps: u64, pictures: u64) -> RecordingError {
 
 /// Returns the name of the map of each of `frames` frames, or of the first `played` of them at least: in this order, or by
 /// number if some are missing.
-fn pair_by_order(
-    dir: &Path,
-    names: &[String],
-    frames: Option<u64>,
-    played: Option<u64>,
-) -> Result<Vec<String>, RecordingError> {
+fn pair_by_order(dir: &Path, names: &[String], frames: Option<u64>, played: Option<u64>) -> Result<Vec<String>> {
     let filled = fill_gaps(names);
     let Some(frames) = frames else { return Ok(filled) };
     let needed = played.map_or(frames, |played| played.min(frames));
@@ -182,7 +173,7 @@ fn fill_gaps(names: &[String]) -> Vec<String> {
 ///
 /// # Errors
 /// Two maps have the name of one picture.
-fn pair_by_stem(dir: &Path, names: &[String], stems: &[String]) -> Result<Option<Vec<String>>, RecordingError> {
+fn pair_by_stem(dir: &Path, names: &[String], stems: &[String]) -> Result<Option<Vec<String>>> {
     let mut by_stem: HashMap<&str, &String> = HashMap::new();
     for name in names {
         let stem = name.rsplit_once('.').map_or(&**name, |(stem, _)| stem);

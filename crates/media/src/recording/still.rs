@@ -10,7 +10,7 @@ use image::ImageFormat;
 
 use super::depth_file::{self, Distances};
 use super::encode::Raster;
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
 pub use super::photo_metadata::PhotoFormat;
@@ -26,7 +26,7 @@ use bokehcam::optics::StereoRig;
 ///
 /// # Errors
 /// The file is missing, not a PNG or JPEG, too large, truncated or damaged.
-pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
+pub fn read_color(path: &Path) -> Result<ColorImage> {
     read_photo(path).map(|(image, _)| image)
 }
 
@@ -34,7 +34,7 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 ///
 /// # Errors
 /// Same as for [`read_color`].
-pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingError> {
+pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata)> {
     decode::read_photo(path).map_err(RecordingError::picture(path))
 }
 
@@ -42,7 +42,7 @@ pub fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), RecordingE
 ///
 /// # Errors
 /// The file is missing, not a PNG or JPEG, or too large.
-pub fn read_size(path: &Path) -> Result<(u32, u32), RecordingError> {
+pub fn read_size(path: &Path) -> Result<(u32, u32)> {
     coded::read_header(path).map(|(size, _)| size).map_err(RecordingError::picture(path))
 }
 
@@ -50,7 +50,7 @@ pub fn read_size(path: &Path) -> Result<(u32, u32), RecordingError> {
 ///
 /// # Errors
 /// The map is larger, or of another aspect ratio.
-pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
+pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<()> {
     match depth_covers(depth, color) {
         true => Ok(()),
         false => Err(RecordingError::picture(path)(PictureFault::DepthSize { found: depth, color })),
@@ -63,7 +63,7 @@ pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Re
 /// # Errors
 /// The file is missing, of another kind, too large, truncated or damaged; its distances are only relative; the scale is
 /// not a number > 0.
-pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
+pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap> {
     check_depth_scale(depth_scale)?;
     let (scale, invalid) = (Some(depth_scale), invalid.map(f32::from));
     let options = depth_file::Options { scale, invalid, ..depth_file::Options::default() };
@@ -79,7 +79,7 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
 ///
 /// # Errors
 /// Same as for [`read_depth`].
-pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
+pub fn read_disparity(path: &Path) -> Result<DisparityMap> {
     depth_file::read_disparity(path).map_err(RecordingError::picture(path))
 }
 
@@ -88,7 +88,7 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
 ///
 /// # Errors
 /// Same as for [`read_color`].
-pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
+pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>)> {
     decode::read_grey(path).map_err(RecordingError::picture(path))
 }
 
@@ -96,7 +96,7 @@ pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
 ///
 /// # Errors
 /// Same as for [`read_color`]; or the picture is black.
-pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
+pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>)> {
     let picture = read_grey(path)?;
     // An all-zero kernel cannot be normalised.
     let is_dark = picture.2.iter().all(|value| *value <= 0.0);
@@ -107,7 +107,7 @@ pub fn read_aperture(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError
 ///
 /// # Errors
 /// The extension is another one; the file exists and `force` is not set; the file cannot be written.
-pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), RecordingError> {
+pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<()> {
     write_photo(path, image, &PhotoMetadata::default(), force)
 }
 
@@ -115,22 +115,12 @@ pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), R
 ///
 /// # Errors
 /// Same as for [`write_color`].
-pub fn write_photo(
-    path: &Path,
-    image: &ColorImage,
-    metadata: &PhotoMetadata,
-    force: bool,
-) -> Result<(), RecordingError> {
+pub fn write_photo(path: &Path, image: &ColorImage, metadata: &PhotoMetadata, force: bool) -> Result<()> {
     write_raster(path, &Raster::from(image), metadata, force)
 }
 
 /// Writes pixels in the format of the file name.
-pub(super) fn write_raster(
-    path: &Path,
-    raster: &Raster,
-    metadata: &PhotoMetadata,
-    force: bool,
-) -> Result<(), RecordingError> {
+pub(super) fn write_raster(path: &Path, raster: &Raster, metadata: &PhotoMetadata, force: bool) -> Result<()> {
     let mut file = Vec::new();
     let encoded = match photo_format(path)? {
         PhotoFormat::Png => encode::encode_photo_png(raster, metadata, &mut file).map_err(|error| error.to_string()),
@@ -145,7 +135,7 @@ pub(super) fn write_raster(
 ///
 /// # Errors
 /// The extension is not `.png`, `.jpg`, `.jpeg`, `.tif`, `.tiff` or `.webp`.
-pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
+pub fn photo_format(path: &Path) -> Result<PhotoFormat> {
     match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
         Some("png") => Ok(PhotoFormat::Png),
         Some("jpg" | "jpeg") => Ok(PhotoFormat::Jpeg),
@@ -184,7 +174,7 @@ pub fn is_gif(path: &Path) -> bool {
 ///
 /// # Errors
 /// Same as for [`write_color`]; or the scale is not a number > 0.
-pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
+pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<()> {
     check_depth_scale(depth_scale)?;
     let map_unit = MapUnit::Depth { per_m: depth_scale };
     let mut file = Vec::new();
@@ -204,12 +194,7 @@ pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool)
 ///
 /// # Errors
 /// Same as for [`write_color`].
-pub fn write_disparity(
-    path: &Path,
-    disparity: &DisparityMap,
-    rig: Option<StereoRig>,
-    force: bool,
-) -> Result<(), RecordingError> {
+pub fn write_disparity(path: &Path, disparity: &DisparityMap, rig: Option<StereoRig>, force: bool) -> Result<()> {
     let map_unit = MapUnit::Disparity { rig };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
@@ -237,7 +222,7 @@ pub enum MapFormat {
 ///
 /// # Errors
 /// The extension is not `.png` or `.pfm`.
-pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
+pub fn map_format(path: &Path) -> Result<MapFormat> {
     if pfm::is_pfm_path(path) {
         Ok(MapFormat::Pfm)
     } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
@@ -247,7 +232,7 @@ pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
     }
 }
 
-fn write<E: Display>(path: &Path, encoded: Result<(), E>, file: &[u8], force: bool) -> Result<(), RecordingError> {
+fn write<E: Display>(path: &Path, encoded: Result<(), E>, file: &[u8], force: bool) -> Result<()> {
     encoded.map_err(|error| RecordingError::picture(path)(PictureFault::Encoding(error.to_string())))?;
     atomic_file::write(path, file, force).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists if !force => RecordingError::Exists { path: path.to_owned() },

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::recording::Options;
 use crate::recording::contents::PictureSource;
-use crate::recording::error::RecordingError;
+use crate::recording::error::{RecordingError, Result};
 use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quote};
 use crate::recording::timeline::given_period_ns;
@@ -23,11 +23,7 @@ const LAST_S: f64 = 1e10;
 ///
 /// # Errors
 /// A picture has no time, and `keep_going` is not set.
-pub(super) fn timed_entries(
-    dir: &Path,
-    pictures: Vec<(&str, PathBuf)>,
-    options: &Options,
-) -> Result<Vec<Entry>, RecordingError> {
+pub(super) fn timed_entries(dir: &Path, pictures: Vec<(&str, PathBuf)>, options: &Options) -> Result<Vec<Entry>> {
     if !dir.join(LIST).exists() {
         let period_ns = given_period_ns(options).unwrap_or(PERIOD_NS);
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::decode;
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::geometry::Geometry;
 use super::{Options, StereoGeometry};
 use bokehcam::optics::StereoRig;
@@ -41,7 +41,7 @@ fn find_half(dir: &Path) -> Option<[&'static str; 2]> {
 }
 
 /// Creates a recording of one frame: the pair, with depth if there are a calibration and a disparity map.
-fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents, RecordingError> {
+fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents> {
     let dir = &folder.dir;
     if let Some([missing, present]) = find_half(dir).filter(|_| find_pair(dir).is_none()) {
         return Err(RecordingError::MissingEye { dir: dir.clone(), missing, present });
@@ -66,11 +66,7 @@ fn open(folder: &RecordingFolder, _: &Options) -> Result<Contents, RecordingErro
 }
 
 /// Reads the rig and the number of disparities from the calibration `file`, scaled to the size of the picture `color`.
-fn read_rig(
-    folder: &RecordingFolder,
-    color: &PictureSource,
-    file: &Path,
-) -> Result<(StereoRig, Option<u32>), RecordingError> {
+fn read_rig(folder: &RecordingFolder, color: &PictureSource, file: &Path) -> Result<(StereoRig, Option<u32>)> {
     let stated = Geometry::read_with(file, calib::parse)?;
     let path = folder.locate(color)?;
     let (size, _) = decode::read_header(&path).map_err(|fault| color.error(&folder.dir, fault))?;

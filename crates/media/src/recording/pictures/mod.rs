@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Layout, ListedFrame, Locator, PictureSource, RecordingFolder};
-use super::error::RecordingError;
+use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::folder::{Pictures, find_pictures, has_pictures};
 use super::rgbd::{self, Scale};
@@ -31,7 +31,7 @@ fn is_map(stem: &str) -> bool {
 }
 
 /// Returns the names of the pictures in `dir` without depth maps, and without the masks of pictures that are there.
-fn find_photos(dir: &Path) -> Result<Vec<String>, RecordingError> {
+fn find_photos(dir: &Path) -> Result<Vec<String>> {
     let names = find_pictures(dir, |stem| !is_map(stem))?;
     let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
     let stems: HashSet<String> = names.iter().map(|name| stem(name)).collect();
@@ -68,11 +68,7 @@ pub fn input_folders(path: &Path) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// The folder cannot be listed, or has no such picture.
-pub(super) fn open_pattern(
-    folder: &RecordingFolder,
-    path: &Path,
-    options: &Options,
-) -> Result<Contents, RecordingError> {
+pub(super) fn open_pattern(folder: &RecordingFolder, path: &Path, options: &Options) -> Result<Contents> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let number = |file: &str| Pattern::parse(&name)?.number(file);
     let mut names = find_pictures(&folder.dir, |_| true)?;
@@ -85,7 +81,7 @@ pub(super) fn open_pattern(
 }
 
 /// Creates the contents from pictures in this order, with their depth maps if there are any.
-fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -> Result<Contents, RecordingError> {
+fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -> Result<Contents> {
     let dir = &folder.dir;
     if !options.keep_going {
         refuse_other_sizes(folder, &names)?;
@@ -135,7 +131,7 @@ fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
 }
 
 /// Refuses pictures of another size than the first. A picture without a readable header is reported when it is read.
-fn refuse_other_sizes(folder: &RecordingFolder, names: &[String]) -> Result<(), RecordingError> {
+fn refuse_other_sizes(folder: &RecordingFolder, names: &[String]) -> Result<()> {
     let (mut expected, mut locator) = (None, Locator::new(folder));
     for name in names {
         let source = PictureSource::from_path(name.into());
