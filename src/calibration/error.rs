@@ -30,11 +30,7 @@ pub enum CalibrationError {
     Files(usize),
     /// The format has a file per camera, and one was given.
     #[error("{}: this is the {format} of one camera; give those of both cameras, the left one first", path.display())]
-    OneCamera {
-        path: PathBuf,
-        /// The usual name of the file.
-        format: &'static str,
-    },
+    OneCamera { path: PathBuf, format: &'static str },
     /// An entry of a file is wrong.
     #[error("{}: {fault}", Location(path, *line))]
     File {
@@ -51,23 +47,13 @@ pub enum CalibrationError {
         "the calibration is for pictures of {}x{}, but these are {}x{}, with another aspect ratio; calibrate at this \
          size, or record at that one", calibrated.0, calibrated.1, found.0, found.1
     )]
-    AspectRatio {
-        /// Columns and rows of the calibration pictures.
-        calibrated: (u32, u32),
-        /// Columns and rows of the pictures.
-        found: (u32, u32),
-    },
+    AspectRatio { calibrated: (u32, u32), found: (u32, u32) },
     /// The calibration does not state its picture size, and does not fit the pictures.
     #[error(
         "the calibration states no picture size, and its principal point ({:.0}, {:.0}) is not near the middle of \
          {}x{}; add `image_size: [WIDTH, HEIGHT]` to it", center_px.0, center_px.1, found.0, found.1
     )]
-    NoSize {
-        /// Column and row of the principal point.
-        center_px: (f64, f64),
-        /// Columns and rows of the pictures.
-        found: (u32, u32),
-    },
+    NoSize { center_px: (f64, f64), found: (u32, u32) },
     /// The pictures are too small for bilinear interpolation, or larger than any map.
     #[error("pictures of {}x{} cannot be rectified: each side needs 2 to 16384 pixels", .0.0, .0.1)]
     Size((u32, u32)),
@@ -91,11 +77,7 @@ pub enum CalibrationError {
 pub enum Fault {
     /// The file does not have its format's syntax.
     #[error("not readable as {format}: {what}")]
-    Syntax {
-        /// YAML or INI.
-        format: &'static str,
-        what: String,
-    },
+    Syntax { format: &'static str, what: String },
     /// A key is missing.
     #[error("{key} is missing; {hint}")]
     Missing { key: String, hint: &'static str },
@@ -107,36 +89,16 @@ pub enum Fault {
     NotFinite { key: String, text: String },
     /// A matrix has the wrong size.
     #[error("{key} is {}x{}, and must be {expected}", found.0, found.1)]
-    Dimensions {
-        key: String,
-        found: (usize, usize),
-        /// Rows and columns that it must have.
-        expected: &'static str,
-    },
+    Dimensions { key: String, found: (usize, usize), expected: &'static str },
     /// The data of a matrix does not fill its rows and columns.
     #[error("{key} says {}x{}, but has {found} numbers", said.0, said.1)]
-    Data {
-        key: String,
-        /// Rows and columns according to the file.
-        said: (usize, usize),
-        /// Number of elements in the data.
-        found: usize,
-    },
+    Data { key: String, said: (usize, usize), found: usize },
     /// The numbers are invalid for their purpose.
     #[error("{key} {what}; calibrate again")]
-    Impossible {
-        key: String,
-        /// What is wrong with the numbers.
-        what: &'static str,
-    },
+    Impossible { key: String, what: &'static str },
     /// The model of camera or lens is not supported.
     #[error("{key} {found:?} is not supported; use {known}")]
-    Model {
-        key: String,
-        found: String,
-        /// The supported models.
-        known: &'static str,
-    },
+    Model { key: String, found: String, known: &'static str },
 }
 
 /// A file and an optional line, for messages.

@@ -41,18 +41,10 @@ pub enum CliError {
     NeverReplaced(PathBuf),
     /// A file or folder cannot be read or written.
     #[error("{}: {}", path.display(), input::format_io_error(source))]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        source: io::Error,
-    },
+    Io { path: PathBuf, source: io::Error },
     /// The report could not be renamed to its final path.
     #[error("{error}; the report is kept as {}", kept.display())]
-    ReportKept {
-        error: Box<CliError>,
-        /// The file with the report.
-        kept: PathBuf,
-    },
+    ReportKept { error: Box<CliError>, kept: PathBuf },
     /// A preview ended before its first frame.
     #[error("{0}")]
     NoFrames(String),

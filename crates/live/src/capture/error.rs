@@ -29,15 +29,7 @@ pub enum CaptureError {
         "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",
         end_s.map_or("its end".into(), |end_s| format!("{end_s} s"))
     )]
-    EmptyRange {
-        source_name: String,
-        /// Start of the range.
-        start_s: f64,
-        /// End of the range.
-        end_s: Option<f64>,
-        /// Time from the first frame to the end of the last one.
-        length_s: f64,
-    },
+    EmptyRange { source_name: String, start_s: f64, end_s: Option<f64>, length_s: f64 },
     /// A picture size or rate that is not supported.
     #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
     Format { width: u32, height: u32, fps: f64 },
@@ -67,9 +59,7 @@ pub enum CaptureError {
     SizesDiffer {
         /// Left camera, then right camera.
         names: [String; 2],
-        /// Width and height of the left pictures.
         left: (u32, u32),
-        /// Width and height of the right pictures.
         right: (u32, u32),
     },
     /// The part to keep is not within the pictures.
@@ -77,13 +67,7 @@ pub enum CaptureError {
         "--crop {}: the pictures of {source_name} are {}x{} after --rotate; choose a part of them",
         area.map(|area| area.to_string()).unwrap_or_default(), size_px.0, size_px.1
     )]
-    AreaOutside {
-        source_name: String,
-        /// The part to keep.
-        area: Option<Area>,
-        /// Width and height of the pictures once they are rotated.
-        size_px: (u32, u32),
-    },
+    AreaOutside { source_name: String, area: Option<Area>, size_px: (u32, u32) },
     /// The camera cannot be opened.
     #[error(transparent)]
     Camera(Box<dyn Error + Send + Sync>),

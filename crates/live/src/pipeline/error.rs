@@ -32,10 +32,7 @@ pub enum Fault {
     Sink(#[from] SinkError),
     /// The blur needs depth that the source lacks.
     #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
-    NoDepth {
-        /// The name of the frame source.
-        source_name: String,
-    },
+    NoDepth { source_name: String },
     /// The executor returned frames out of order, or none.
     #[error("the blur executor did not return the oldest frame: please report this")]
     LostFrame,
@@ -43,11 +40,7 @@ pub enum Fault {
     Panic { stage: &'static str, message: String },
     /// The system could not create a thread.
     #[error("cannot start the thread of the {stage} stage: {cause}")]
-    Thread {
-        stage: &'static str,
-        /// The system's error.
-        cause: io::Error,
-    },
+    Thread { stage: &'static str, cause: io::Error },
 }
 
 impl Fault {

@@ -14,11 +14,7 @@ pub enum SinkError {
          FILE.mp4, FILE.mkv, FILE.webm, FILE.mov, - (y4m on standard output) or null",
         near.as_ref().map_or(String::new(), |near| format!(" (did you mean {near}?)"))
     )]
-    Target {
-        name: String,
-        /// A similar name that may have been meant.
-        near: Option<String>,
-    },
+    Target { name: String, near: Option<String> },
     /// An existing folder, named without the slash that would make it a sink.
     #[error("no sink '{name}': it is a folder; to write numbered PNG files into it, give {name}/ (with the slash)")]
     NoSlash { name: String },
@@ -41,18 +37,10 @@ pub enum SinkError {
     Folder(#[from] FolderError),
     /// Writing failed, but the frames until then are kept.
     #[error("{error}; the frames written before it are kept as {}", kept.display())]
-    Kept {
-        error: Box<SinkError>,
-        /// The file or folder.
-        kept: PathBuf,
-    },
+    Kept { error: Box<SinkError>, kept: PathBuf },
     /// Writing failed, and the frames until then could not be kept.
     #[error("{error}; the frames written before it are lost as well: {cause}")]
-    Lost {
-        error: Box<SinkError>,
-        /// Why they could not be kept.
-        cause: io::Error,
-    },
+    Lost { error: Box<SinkError>, cause: io::Error },
     /// The file or its folder was removed while it was written.
     #[error("{} was removed while it was being written", path.display())]
     Removed { path: PathBuf },
@@ -64,23 +52,13 @@ pub enum SinkError {
     Thread { sink: String, cause: io::Error },
     /// The file system refused.
     #[error("cannot write {}: {cause}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system error.
-        cause: io::Error,
-    },
+    Write { path: PathBuf, cause: io::Error },
     /// The disk is full.
     #[error("the disk is full (No space left on device): {} ends early", path.display())]
     Full { path: PathBuf },
     /// A frame's size differs from the stream's.
     #[error("the stream is {} x {} pixels, and a frame has {} x {}", made_for.0, made_for.1, got.0, got.1)]
-    Size {
-        /// Width and height of the stream.
-        made_for: (u32, u32),
-        /// Width and height of the frame.
-        got: (u32, u32),
-    },
+    Size { made_for: (u32, u32), got: (u32, u32) },
     /// A defect of this program.
     #[error("this output received YUYV without requesting it; please report this")]
     Yuyv,

@@ -77,34 +77,15 @@ pub enum LayoutError {
     #[error("the device gives pictures of {width} x {height} pixels, but 1 to {MAX_SIDE_PX} per side are supported")]
     Size { width: u32, height: u32 },
     #[error("the device reports {stride_bytes} bytes a row, but {width} pixels of {fourcc} need {min_size_bytes}")]
-    Stride {
-        fourcc: FourCc,
-        width: u32,
-        /// As the device reports it.
-        stride_bytes: usize,
-        min_size_bytes: usize,
-    },
+    Stride { fourcc: FourCc, width: u32, stride_bytes: usize, min_size_bytes: usize },
     /// The buffer is too small for the picture.
     #[error(
         "the device reports {size_bytes} bytes a picture, but {width} x {height} pixels of {fourcc} need {min_size_bytes}"
     )]
-    Short {
-        fourcc: FourCc,
-        width: u32,
-        height: u32,
-        /// As the device reports it.
-        size_bytes: usize,
-        min_size_bytes: usize,
-    },
+    Short { fourcc: FourCc, width: u32, height: u32, size_bytes: usize, min_size_bytes: usize },
     /// The number of memory planes does not fit the format.
     #[error("the device gives {fourcc} in {found} memory planes instead of {expected}")]
-    Planes {
-        fourcc: FourCc,
-        /// As the device reports it.
-        found: usize,
-        /// As the format requires.
-        expected: usize,
-    },
+    Planes { fourcc: FourCc, found: usize, expected: usize },
     #[error(
         "the device gives interlaced pictures (field order {0}), which are not supported; choose a progressive mode"
     )]

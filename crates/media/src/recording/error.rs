@@ -19,75 +19,39 @@ pub enum RecordingError {
         "{}: not a recording: looked for {expected_files}, and found none of these; give the folder that contains \
          them", dir.display()
     )]
-    NotARecording {
-        dir: PathBuf,
-        /// The files that identify a recording.
-        expected_files: String,
-    },
+    NotARecording { dir: PathBuf, expected_files: String },
     /// A list that the layout needs is missing.
     #[error("{}: the list {missing} is missing beside {present}; restore it (lines of `time file`)", dir.display())]
-    MissingList {
-        dir: PathBuf,
-        /// The missing list.
-        missing: &'static str,
-        /// The list that exists.
-        present: &'static str,
-    },
+    MissingList { dir: PathBuf, missing: &'static str, present: &'static str },
     /// Several lists pair colour with depth, and none has a usual name.
     #[error(
         "{}: {} and {} both pair pictures; rename the right one to associations.txt", dir.display(), lists[0], lists[1]
     )]
-    TwoLists {
-        dir: PathBuf,
-        /// The names of two of them.
-        lists: [String; 2],
-    },
+    TwoLists { dir: PathBuf, lists: [String; 2] },
     /// A list has no entries.
     #[error("{}: the list names no picture; add lines of `time file`, or remove the list", list.display())]
     EmptyList { list: PathBuf },
     /// A list is too long.
     #[error("{}: the list has more than {most} lines; split the recording", list.display())]
-    LongList {
-        list: PathBuf,
-        /// The maximum number of lines.
-        most: usize,
-    },
+    LongList { list: PathBuf, most: usize },
     /// A folder that serves as a list has no pictures.
     #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
     EmptyFolder { folder: PathBuf },
     /// A folder has too many files.
     #[error("{}: the folder has more than {most} pictures; split it", folder.display())]
-    CrowdedFolder {
-        folder: PathBuf,
-        /// The maximum number of pictures.
-        most: usize,
-    },
+    CrowdedFolder { folder: PathBuf, most: usize },
     /// No picture has a name of the pattern.
     #[error("{}: no picture has a name like {pattern}; correct the pattern, or give the folder", folder.display())]
-    NoMatch {
-        folder: PathBuf,
-        /// The pattern of the file names.
-        pattern: String,
-    },
+    NoMatch { folder: PathBuf, pattern: String },
     /// Two pictures of one kind have the same name or number.
     #[error("{}: its name or number is also that of {other}; remove or rename one of them", path.display())]
-    SameNumber {
-        path: PathBuf,
-        /// The name of the other picture.
-        other: String,
-    },
+    SameNumber { path: PathBuf, other: String },
     /// No depth map has the name or number of a colour picture.
     #[error(
         "{}: no depth map in {depth} has the name or number of a colour picture in {color}; number both alike, or pair \
          them in associations.txt (lines of `time file time file`)", dir.display()
     )]
-    NoNumberPairs {
-        dir: PathBuf,
-        /// The folder of colour pictures.
-        color: String,
-        /// The folder of depth maps.
-        depth: String,
-    },
+    NoNumberPairs { dir: PathBuf, color: String, depth: String },
     /// A folder of depth maps does not belong to the pictures.
     #[error(
         "{}: {maps} depth maps for {pictures} pictures or more; export one for each, numbered or named alike",
@@ -109,44 +73,23 @@ pub enum RecordingError {
     },
     /// The file that states the depth scale is invalid.
     #[error("{}: {what}; correct it, or give the units per metre with --depth-scale", file.display())]
-    StatedScale {
-        file: PathBuf,
-        /// The fault.
-        what: String,
-    },
+    StatedScale { file: PathBuf, what: String },
     /// One camera of a pair is missing.
     #[error("{}: {missing} is missing beside {present}; restore the pictures of the other camera", dir.display())]
-    MissingEye {
-        dir: PathBuf,
-        /// The missing folder.
-        missing: &'static str,
-        /// The folder that exists.
-        present: &'static str,
-    },
+    MissingEye { dir: PathBuf, missing: &'static str, present: &'static str },
     /// A picture of one camera has no counterpart of the other.
     #[error("{}: no picture of this name in {other}; restore it, remove this one, or use --keep-going", path.display())]
-    NoPartner {
-        path: PathBuf,
-        /// The folder of the other camera.
-        other: &'static str,
-    },
+    NoPartner { path: PathBuf, other: &'static str },
     /// There are more pictures than times in the list.
     #[error("{}: the list has {times} times, but none for {picture}; complete the list, remove it, or use \
              --keep-going", list.display())]
-    TooFewTimes {
-        list: PathBuf,
-        /// The number of times.
-        times: usize,
-        /// The first picture without a time.
-        picture: String,
-    },
+    TooFewTimes { list: PathBuf, times: usize, picture: String },
     /// The calibration of a rectified pair is invalid.
     #[error("{}{}: {fault}", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Geometry {
         file: PathBuf,
         /// Line number, from 1, if a single line is at fault.
         line: Option<u32>,
-        /// The fault.
         fault: GeometryFault,
     },
     /// The calibration of a raw pair is invalid.
@@ -154,18 +97,13 @@ pub enum RecordingError {
     Calibration(#[from] CalibrationError),
     /// The calibration of the depth camera does not belong to the recording.
     #[error("{}: depth camera: {what}", dir.display())]
-    DepthCalibration {
-        dir: PathBuf,
-        /// What is wrong.
-        what: String,
-    },
+    DepthCalibration { dir: PathBuf, what: String },
     /// A line of a list is invalid.
     #[error("{}:{line}: {fault}", list.display())]
     Line {
         list: PathBuf,
         /// Line number, from 1.
         line: u32,
-        /// The fault.
         fault: LineFault,
     },
     /// Both columns of the associations hold the same kind of picture, or none is readable.
@@ -179,21 +117,13 @@ pub enum RecordingError {
         "{}: no depth map lies within {} ms of any colour picture: are the lists of one recording, with times of one \
          clock? Correct the times, or remove depth.txt to use the colour alone", dir.display(), *tolerance_ns as f64 / 1e6
     )]
-    NoPairs {
-        dir: PathBuf,
-        /// Largest time difference of a pair.
-        tolerance_ns: u64,
-    },
+    NoPairs { dir: PathBuf, tolerance_ns: u64 },
     /// No picture of the right camera is close in time to one of the left camera.
     #[error(
         "{}: no picture of the right camera lies within {} ms of one of the left; are the lists of one recording?",
         dir.display(), *tolerance_ns as f64 / 1e6
     )]
-    NoStereoPairs {
-        dir: PathBuf,
-        /// Largest time difference of a pair.
-        tolerance_ns: u64,
-    },
+    NoStereoPairs { dir: PathBuf, tolerance_ns: u64 },
     /// A picture in a list is missing or invalid.
     #[error(
         "{}:{line}: {}: {fault}{}", list.display(), file.display(),
@@ -203,18 +133,12 @@ pub enum RecordingError {
         list: PathBuf,
         /// Line number, from 1.
         line: u32,
-        /// The file as the list names it.
         file: PathBuf,
-        /// The fault.
         fault: PictureFault,
     },
     /// A picture is missing or invalid.
     #[error("{}: {fault}", path.display())]
-    Picture {
-        path: PathBuf,
-        /// The fault.
-        fault: PictureFault,
-    },
+    Picture { path: PathBuf, fault: PictureFault },
     /// Depth was requested, and the recording has none.
     #[error("{}: the recording has no depth; use an effect that needs none, or another source of depth", dir.display())]
     NoDepth { dir: PathBuf },
@@ -223,27 +147,18 @@ pub enum RecordingError {
     NoRight { dir: PathBuf },
     /// The frame number is beyond the end.
     #[error("frame {index} was requested, but the recording has {len} frames, numbered from 0")]
-    NoSuchFrame {
-        /// The requested frame.
-        index: usize,
-        /// The number of frames.
-        len: usize,
-    },
+    NoSuchFrame { index: usize, len: usize },
     /// The depth scale is not a number of units per metre.
     #[error("the depth scale is {0}; give units per metre, greater than 0, such as 5000 or 1000")]
     DepthScale(f32),
     /// The output exists already.
     #[error("{}: exists already; choose another name, or allow overwriting", path.display())]
-    Exists {
-        /// The file or folder.
-        path: PathBuf,
-    },
+    Exists { path: PathBuf },
     /// A frame cannot be added to the recording.
     #[error("frame {index} cannot be recorded: {reason}")]
     Unrecordable {
         /// Number of the frame, from 0.
         index: usize,
-        /// The reason.
         reason: String,
     },
     /// A recording was finished without any frame.
@@ -254,13 +169,7 @@ pub enum RecordingError {
     Folder(#[from] FolderError),
     /// An operating system error.
     #[error("cannot {action} {}: {cause}", path.display())]
-    Io {
-        /// The failed action.
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        cause: io::Error,
-    },
+    Io { action: &'static str, path: PathBuf, cause: io::Error },
 }
 
 impl RecordingError {

@@ -16,12 +16,7 @@ pub enum LineFault {
     NotUtf8,
     /// Columns are missing, or there are too many.
     #[error("expected `{expected}`, found {found} column(s); correct or remove the line")]
-    Columns {
-        /// The columns of the list.
-        expected: &'static str,
-        /// The number of columns in the line.
-        found: usize,
-    },
+    Columns { expected: &'static str, found: usize },
     /// The text is not a time in nanoseconds.
     #[error("{0:?} is not a time; write nanoseconds as a whole number, such as 1403715276262142976")]
     Nanoseconds(String),
@@ -53,12 +48,7 @@ pub enum GeometryFault {
     Missing(String),
     /// A value is invalid.
     #[error("{key}: {found:?} is not {expected}; correct the line")]
-    Value {
-        key: String,
-        /// The kind of value expected.
-        expected: &'static str,
-        found: String,
-    },
+    Value { key: String, expected: &'static str, found: String },
     /// The baseline is 0, which gives no depth.
     #[error("the baseline is 0: both cameras are in the same place; give the calibration of both cameras")]
     NoBaseline,
@@ -74,12 +64,7 @@ pub enum GeometryFault {
          pictures",
         of.0, of.1, pictures.0, pictures.1
     )]
-    Size {
-        /// Width and height that the calibration is for.
-        of: (u32, u32),
-        /// Width and height of the pictures.
-        pictures: (u32, u32),
-    },
+    Size { of: (u32, u32), pictures: (u32, u32) },
 }
 
 /// Result of reading a picture.
@@ -125,7 +110,6 @@ pub enum PictureFault {
     TiffForm {
         /// Its compression or samples, in words.
         form: String,
-        /// How to save it.
         remedy: &'static str,
     },
     /// The header states more pixels than are supported.
@@ -136,12 +120,7 @@ pub enum PictureFault {
     TooLarge { width: u32, height: u32 },
     /// The file is larger than any supported picture.
     #[error("the file has {bytes} bytes, and at most {max_bytes} are read; convert it")]
-    FileSize {
-        /// Size of the file.
-        bytes: u64,
-        /// The maximum size.
-        max_bytes: u64,
-    },
+    FileSize { bytes: u64, max_bytes: u64 },
     /// The picture has no pixels.
     #[error("the picture has no pixel ({width}x{height}); export it again")]
     NoPixel { width: u32, height: u32 },
@@ -156,69 +135,39 @@ pub enum PictureFault {
         "the picture is {}x{}, and the recording began with {}x{}; all its colour pictures need the same size",
         found.0, found.1, expected.0, expected.1
     )]
-    Size {
-        /// Width and height of this picture.
-        found: (u32, u32),
-        /// Width and height of the first picture.
-        expected: (u32, u32),
-    },
+    Size { found: (u32, u32), expected: (u32, u32) },
     /// The size of a right picture differs from that of the left ones.
     #[error(
         "the right picture is {}x{}, and the left one {}x{}; both need the same size",
         found.0, found.1, left.0, left.1
     )]
-    EyeSize {
-        /// Width and height of this picture.
-        found: (u32, u32),
-        /// Width and height of the left pictures.
-        left: (u32, u32),
-    },
+    EyeSize { found: (u32, u32), left: (u32, u32) },
     /// A depth map does not cover its colour picture.
     #[error(
         "the depth map is {}x{}, which does not cover a colour picture of {}x{}; if both show the same view, add \
          --depth-fit stretch, and if the picture is the middle of the map, --depth-fit crop",
         found.0, found.1, color.0, color.1
     )]
-    DepthSize {
-        /// Width and height of the depth map.
-        found: (u32, u32),
-        /// Width and height of the colour pictures.
-        color: (u32, u32),
-    },
+    DepthSize { found: (u32, u32), color: (u32, u32) },
     /// A depth map has another size than its calibration.
     #[error(
         "the depth map is {}x{}, and the depth camera is calibrated for {}x{}; correct the calibration",
         found.0, found.1, calibrated.0, calibrated.1
     )]
-    CalibratedSize {
-        /// Width and height of the depth map.
-        found: (u32, u32),
-        /// Width and height for which the depth camera is calibrated.
-        calibrated: (u32, u32),
-    },
+    CalibratedSize { found: (u32, u32), calibrated: (u32, u32) },
     /// The view of a depth camera, without a calibration that says where the colour camera is.
     #[error(
         "the depth map is {}x{}, of another view than the picture, and the file {reason}; give a calibration with \
          --depth-calibration, or use --depth none",
         found.0, found.1
     )]
-    Uncalibrated {
-        /// Width and height of the depth map.
-        found: (u32, u32),
-        /// Why the file's calibration is not used.
-        reason: String,
-    },
+    Uncalibrated { found: (u32, u32), reason: String },
     /// A mask has another aspect ratio than its picture.
     #[error(
         "the mask is {}x{}, of another aspect ratio than the picture's {}x{}; export it in the picture's, in any size",
         found.0, found.1, color.0, color.1
     )]
-    MaskSize {
-        /// Width and height of the mask.
-        found: (u32, u32),
-        /// Width and height of the picture.
-        color: (u32, u32),
-    },
+    MaskSize { found: (u32, u32), color: (u32, u32) },
     /// The file name has no supported extension.
     #[error("no format is known for this name; end it with {0}")]
     Extension(&'static str),
@@ -258,12 +207,7 @@ pub enum PictureFault {
         "it has the colours of {name}; add --depth-unit inverse if {} is near, or --depth-unit inverse \
          --depth-invert if {} is near", ends[0], ends[1]
     )]
-    ColorMapped {
-        /// The name of the colour map.
-        name: &'static str,
-        /// The colours that are usually near and far.
-        ends: Box<[&'static str; 2]>,
-    },
+    ColorMapped { name: &'static str, ends: Box<[&'static str; 2]> },
     /// The picture is not a depth map.
     #[error(
         "{0} is not depth; export depth as a 16-bit grey PNG; for inverse depth, where white is near, use --depth-unit \

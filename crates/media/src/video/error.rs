@@ -28,11 +28,7 @@ pub enum VideoError {
          convert it: ffmpeg -i IN -c:v libx264 OUT.mp4",
         path.display()
     )]
-    Unlisted {
-        path: PathBuf,
-        /// ffmpeg's name of the format.
-        format: String,
-    },
+    Unlisted { path: PathBuf, format: String },
     /// The file has sound only, or a cover picture.
     #[error("{}: there is no video in it, only sound or other data; give another file", path.display())]
     NoVideo { path: PathBuf },
@@ -51,36 +47,19 @@ pub enum VideoError {
          by `stream --keep-going`",
         path.display()
     )]
-    Damaged {
-        path: PathBuf,
-        /// Number of pictures decoded.
-        frames: u64,
-        /// The first messages of ffmpeg.
-        what: String,
-    },
+    Damaged { path: PathBuf, frames: u64, what: String },
     /// A video of depth does not cover the pictures.
     #[error(
         "{}: the depth is {}x{}, which does not cover pictures of {}x{}; export it with the same aspect",
         path.display(), found.0, found.1, color.0, color.1
     )]
-    DepthSize {
-        path: PathBuf,
-        /// Width and height of the depth.
-        found: (u32, u32),
-        /// Width and height of the pictures.
-        color: (u32, u32),
-    },
+    DepthSize { path: PathBuf, found: (u32, u32), color: (u32, u32) },
     /// A video of depth belongs to other pictures.
     #[error(
         "{}: its depth has {frames} frames, and the pictures have {needed} or more; export the depth of every frame",
         path.display()
     )]
-    FrameCount {
-        path: PathBuf,
-        frames: u64,
-        /// Number of colour frames, as far as it is known.
-        needed: u64,
-    },
+    FrameCount { path: PathBuf, frames: u64, needed: u64 },
     /// ffmpeg does nothing any more.
     #[error("{}: ffmpeg hung, and was killed", path.display())]
     Hung { path: PathBuf },

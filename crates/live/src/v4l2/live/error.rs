@@ -24,17 +24,9 @@ pub enum OpenError {
     Denied(PathBuf),
     /// Another program uses it.
     #[error("{}: the camera is busy{}", path.display(), format_holders(.holders))]
-    Busy {
-        path: PathBuf,
-        /// The processes that have it open.
-        holders: Vec<Holder>,
-    },
+    Busy { path: PathBuf, holders: Vec<Holder> },
     #[error("{}: this is not a camera: {what}; `bokehcam devices` lists the cameras", path.display())]
-    NotACamera {
-        path: PathBuf,
-        /// What it is instead.
-        what: &'static str,
-    },
+    NotACamera { path: PathBuf, what: &'static str },
     /// It offers no usable mode.
     #[error("{}: {source}", path.display())]
     NoMode { path: PathBuf, source: NoMode },

@@ -19,11 +19,7 @@ pub enum LoopbackError {
     NotVideo { path: PathBuf },
     /// It belongs to another driver.
     #[error("{} is '{card}', not a virtual camera: {}", path.display(), format_remedy(Path::new("")))]
-    NotLoopback {
-        path: PathBuf,
-        /// The device's name.
-        card: String,
-    },
+    NotLoopback { path: PathBuf, card: String },
     /// The user may not open it.
     #[error(
         "you have no permission for {}: join the group that owns it with `sudo usermod -aG video $USER`, and log in \
@@ -33,25 +29,14 @@ pub enum LoopbackError {
     Denied { path: PathBuf },
     /// Another program writes to it, or the limit of openers is reached.
     #[error("{} is in use{}: stop that program, or use another virtual camera", path.display(), By(by))]
-    InUse {
-        path: PathBuf,
-        /// The processes that have it open.
-        by: Vec<Holder>,
-    },
+    InUse { path: PathBuf, by: Vec<Holder> },
     /// Its format is fixed to one that cannot be written.
     #[error(
         "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that program, or free the format with `v4l2-ctl \
          -d {} -c keep_format=0`",
         path.display(), By(by), path.display()
     )]
-    FormatFixed {
-        path: PathBuf,
-        fourcc: String,
-        width: u32,
-        height: u32,
-        /// The processes that have it open.
-        by: Vec<Holder>,
-    },
+    FormatFixed { path: PathBuf, fourcc: String, width: u32, height: u32, by: Vec<Holder> },
     /// It accepts no frames and delivers none.
     #[error(
         "{} takes no frames since its last writer left, a fault of v4l2loopback before 0.13: reload the module with \
@@ -60,12 +45,7 @@ pub enum LoopbackError {
     )]
     Stuck { path: PathBuf },
     #[error("{}: {doing}: {cause}", path.display())]
-    System {
-        path: PathBuf,
-        doing: &'static str,
-        /// The system error.
-        cause: io::Error,
-    },
+    System { path: PathBuf, doing: &'static str, cause: io::Error },
 }
 
 /// Displays ` by this, that`, or nothing if no holder is known.
