@@ -3,6 +3,7 @@
 use crate::compute::GpuError;
 
 /// Why a frame could not be blurred.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum BokehError {
     /// The effect needs a depth map and the frame has none.
@@ -10,12 +11,7 @@ pub enum BokehError {
     NoDepth,
     /// The size of the picture differs from that of the executor.
     #[error("the executor was made for {made_for:?} pixels, the frame has {got:?}")]
-    Size {
-        /// Width and height the executor was made for.
-        made_for: (u32, u32),
-        /// Width and height of the frame.
-        got: (u32, u32),
-    },
+    Size { made_for: (u32, u32), got: (u32, u32) },
     /// The blur is wider than the picture, or than the method supports.
     #[error(
         "a blur radius of {radius_px} px is too large: {} at most {max_px} px; lower --max-coc or --blur",
@@ -23,11 +19,9 @@ pub enum BokehError {
                          use".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
     )]
     TooWide {
-        /// Largest radius of the settings, in pixels.
         radius_px: f32,
         /// [`max_radius_px`](super::Settings::max_radius_px).
         max_px: f32,
-        /// Width and height of the pictures.
         size: (u32, u32),
         /// True if the method sets the limit.
         by_method: bool,
@@ -38,18 +32,10 @@ pub enum BokehError {
          smaller, or close other programs",
         size.0, size.1
     )]
-    Memory {
-        /// Width and height in pixels.
-        size: (u32, u32),
-        /// Estimated memory of the blur.
-        needed_mb: u64,
-        /// Memory that this process can still allocate.
-        free_mb: u64,
-    },
+    Memory { size: (u32, u32), needed_mb: u64, free_mb: u64 },
     /// The lengths of slices do not match the picture.
     #[error("slices of {lengths:?} values for pixels, result and radii do not fit a picture of {size:?}")]
     Lengths {
-        /// Width and height in pixels.
         size: (u32, u32),
         /// Lengths of the pixels, the result and the radii.
         lengths: [usize; 3],

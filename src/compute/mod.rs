@@ -47,11 +47,7 @@ pub enum PictureLocation {
 pub enum GpuError {
     /// No adapter fits the request.
     #[error("no GPU adapter {wanted}; found: {found}. Use --backend cpu, or install a Vulkan driver")]
-    NoAdapter {
-        /// Description of the requested adapter.
-        wanted: String,
-        found: String,
-    },
+    NoAdapter { wanted: String, found: String },
     /// The GPU refused or was lost.
     #[error("GPU: {0}")]
     Failed(String),

@@ -116,6 +116,7 @@ pub struct FrameInput<'a> {
 }
 
 /// Why a frame has no depth.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum DepthError {
     /// A file that has the depth, or makes it, cannot be read.
@@ -123,39 +124,20 @@ pub enum DepthError {
     File(Box<dyn Error + Send + Sync>),
     /// A depth camera has delivered no map yet. Later frames may have one.
     #[error("{source_name}: no depth yet")]
-    Unpaired {
-        /// The camera.
-        source_name: String,
-    },
+    Unpaired { source_name: String },
     /// Stereo matching failed.
     #[error(transparent)]
     Match(#[from] stereo::MatchError),
     /// A stereo frame lacks the picture of the right camera.
     #[error("{source_name}: this frame has no right picture")]
-    MissingRight {
-        /// Name of the frame source.
-        source_name: String,
-    },
+    MissingRight { source_name: String },
     /// A network failed.
     #[error("{name}: {why}")]
-    Network {
-        /// The network's file.
-        name: String,
-        /// The reason.
-        why: String,
-    },
+    Network { name: String, why: String },
     /// A background plate cannot be used.
     #[error("{name}: {why}")]
-    Plate {
-        /// The plate's file.
-        name: String,
-        /// The reason.
-        why: String,
-    },
+    Plate { name: String, why: String },
     /// The source has no depth at all.
     #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
-    NoDepth {
-        /// Name of the frame source.
-        source_name: String,
-    },
+    NoDepth { source_name: String },
 }

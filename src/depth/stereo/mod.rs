@@ -100,6 +100,7 @@ pub trait Matcher: Send {
 }
 
 /// Error of matching a pair.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum MatchError {
     /// The pictures of a pair differ in size.
@@ -107,34 +108,17 @@ pub enum MatchError {
         "the left picture is {}x{}, and the right one {}x{}; both need the same size",
         left.0, left.1, right.0, right.1
     )]
-    Sizes {
-        /// Columns and rows of the left picture.
-        left: (u32, u32),
-        /// Columns and rows of the right picture.
-        right: (u32, u32),
-    },
+    Sizes { left: (u32, u32), right: (u32, u32) },
     /// The pictures do not have the size that the matcher was made for.
     #[error("the matcher is made for {}x{}, but was given {}x{}", made_for.0, made_for.1, got.0, got.1)]
-    Size {
-        /// Width and height that the matcher was made for.
-        made_for: (u32, u32),
-        /// Columns and rows of the pictures.
-        got: (u32, u32),
-    },
+    Size { made_for: (u32, u32), got: (u32, u32) },
     /// There is not enough memory to match pictures of this size.
     #[error(
         "matching pictures of {}x{} needs about {needed_mb} MB of memory, and {free_mb} MB are free; scale both down, or \
          free some",
         size.0, size.1
     )]
-    Memory {
-        /// Width and height.
-        size: (u32, u32),
-        /// Estimated memory of the matching.
-        needed_mb: u64,
-        /// Memory that this process can still allocate.
-        free_mb: u64,
-    },
+    Memory { size: (u32, u32), needed_mb: u64, free_mb: u64 },
     /// There is no GPU, or it failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),

@@ -90,24 +90,15 @@ impl Network {
 }
 
 /// An error in loading a network.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
     /// The file cannot be read.
     #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// The network cannot be run here.
     #[error("{}: this network cannot be run: {why}", path.display())]
-    Refused {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        why: String,
-    },
+    Refused { path: PathBuf, why: String },
 }
 
 /// A loaded network, and what is known about its file.

@@ -38,35 +38,21 @@ enum Backend {
 pub struct NoColor(pub FourCc);
 
 /// Why a picture cannot be decoded. The next one may be good.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PixelError {
     /// The number of memory planes is wrong.
     #[error("the picture has {found} memory planes instead of {expected}")]
-    Planes {
-        /// Number of planes passed.
-        found: usize,
-        /// Number of planes in the layout.
-        expected: usize,
-    },
+    Planes { found: usize, expected: usize },
     /// The picture is truncated.
     #[error("the picture is cut short: {found_bytes} of {min_size_bytes} bytes")]
-    Short {
-        /// Bytes passed.
-        found_bytes: usize,
-        /// Bytes that the layout needs.
-        min_size_bytes: usize,
-    },
+    Short { found_bytes: usize, min_size_bytes: usize },
     /// The JPEG is truncated or damaged.
     #[error("damaged JPEG: {0}")]
     Jpeg(String),
     /// The JPEG's size differs from the negotiated one.
     #[error("the JPEG has {} x {} pixels instead of {} x {}", found.0, found.1, expected.0, expected.1)]
-    Size {
-        /// Width and height of the JPEG.
-        found: (usize, usize),
-        /// Width and height of the layout.
-        expected: (usize, usize),
-    },
+    Size { found: (usize, usize), expected: (usize, usize) },
 }
 
 impl Decoder {

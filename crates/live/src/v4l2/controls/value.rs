@@ -47,11 +47,7 @@ pub enum ControlError {
     #[error("control {0} has no value to read")]
     NoValue(String),
     #[error("control {name}: {source}")]
-    Device {
-        name: String,
-        /// The system error.
-        source: io::Error,
-    },
+    Device { name: String, source: io::Error },
 }
 
 fn format_suggestion(similar: &[String], count: usize) -> String {

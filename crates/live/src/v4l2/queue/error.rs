@@ -8,17 +8,10 @@ use super::{BUFFERS, MIN_BUFFERS};
 #[derive(Debug, thiserror::Error)]
 pub enum QueueError {
     #[error("{step}: {source}")]
-    Refused {
-        /// The failed call.
-        step: &'static str,
-        source: io::Error,
-    },
+    Refused { step: &'static str, source: io::Error },
     /// Too few to read one while another is filled.
     #[error("the driver gives {granted} of {BUFFERS} buffers, but at least {MIN_BUFFERS} are needed")]
-    TooFewBuffers {
-        /// The number of buffers granted.
-        granted: u32,
-    },
+    TooFewBuffers { granted: u32 },
     /// The driver violated the V4L2 protocol.
     #[error("the driver gave back buffer {0}, which it did not have")]
     Foreign(u32),
