@@ -4,7 +4,6 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use pipewire::buffer::Buffer;
@@ -22,7 +21,7 @@ use super::graph::{Camera, Graph};
 use super::mode::{self, Mode, NegotiatedFormat};
 use super::param;
 use super::session::Session;
-use super::wake::Waker;
+use super::wake::{Waker, WokenThread};
 use bokehcam::clock::Clock;
 
 /// Longest wait for a camera's first format, from the request on.
@@ -70,10 +69,8 @@ pub trait PictureHandler: Send + 'static {
 /// Reads from one camera until it is dropped.
 #[derive(Debug)]
 pub struct Reader {
-    waker: Waker,
-    stop: Arc<AtomicBool>,
+    thread: WokenThread,
     is_wanted: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
 }
 
 /// Channel that receives, once, the camera and its format, or the error.
@@ -91,8 +88,7 @@ impl Reader {
         filters: bool,
         handler: impl PictureHandler,
     ) -> Result<(Self, Camera, NegotiatedFormat), PipeWireError> {
-        let waker = Waker::new().map_err(PipeWireError::Thread)?;
-        let (stop, is_wanted) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
+        let is_wanted = Arc::new(AtomicBool::new(true));
         let (ready, is_ready) = mpsc::channel();
         let listener = Listener {
             handler: RefCell::new(Box::new(handler)),
@@ -105,11 +101,9 @@ impl Reader {
             outage_since_ns: Cell::new(None),
             filters,
         };
-        let (waker_handle, end, wanted, owned_name) =
-            (waker.clone(), Arc::clone(&stop), Arc::clone(&is_wanted), name.to_owned());
-        let run = move || Rc::new(listener).run(&owned_name, &waker_handle, [&end, &wanted]);
-        let thread = Some(thread::Builder::new().name("pipewire".into()).spawn(run).map_err(PipeWireError::Thread)?);
-        let reader = Self { waker, stop, is_wanted, thread };
+        let (wanted, owned_name) = (Arc::clone(&is_wanted), name.to_owned());
+        let run = move |waker: &Waker, stop: &AtomicBool| Rc::new(listener).run(&owned_name, waker, [stop, &wanted]);
+        let reader = Self { thread: WokenThread::start("pipewire", run)?, is_wanted };
         let (camera, negotiated) =
             is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::NoPictures { name: name.to_owned() })??;
         Ok((reader, camera, negotiated))
@@ -118,17 +112,8 @@ impl Reader {
     /// Sets whether pictures are requested; while they are not, the camera is released.
     pub fn set_wanted(&self, wanted: bool) {
         if self.is_wanted.swap(wanted, Ordering::AcqRel) != wanted {
-            self.waker.wake();
+            self.thread.waker.wake();
         }
-    }
-}
-
-impl Drop for Reader {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        self.waker.wake();
-        // A panic of the thread was printed already.
-        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 

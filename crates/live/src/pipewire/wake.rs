@@ -3,9 +3,13 @@
 use std::io;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
+
+use super::PipeWireError;
 
 /// Wakes the loop that polls [`Waker::descriptor`]. Clones share one eventfd.
 #[derive(Clone, Debug)]
@@ -40,5 +44,35 @@ impl Waker {
     /// Returns another descriptor of the eventfd, which is readable while a wake is pending.
     pub fn descriptor(&self) -> io::Result<OwnedFd> {
         self.0.try_clone()
+    }
+}
+
+/// A thread that sleeps on a waker; it is ended on drop.
+#[derive(Debug)]
+pub struct WokenThread {
+    pub waker: Waker,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl WokenThread {
+    /// Starts a thread with this name. It has to return when it is woken with the flag set.
+    ///
+    /// # Errors
+    /// The system refuses the thread, or its eventfd.
+    pub fn start(name: &str, run: impl FnOnce(&Waker, &AtomicBool) + Send + 'static) -> Result<Self, PipeWireError> {
+        let (waker, stop) = (Waker::new().map_err(PipeWireError::Thread)?, Arc::<AtomicBool>::default());
+        let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
+        let thread = thread::Builder::new().name(name.into()).spawn(move || run(&waker_handle, &end));
+        Ok(Self { waker, stop, thread: Some(thread.map_err(PipeWireError::Thread)?) })
+    }
+}
+
+impl Drop for WokenThread {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        self.waker.wake();
+        // A panic of the thread was printed already.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }

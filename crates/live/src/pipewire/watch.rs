@@ -5,7 +5,6 @@ use std::collections::HashSet;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use pipewire::spa::support::system::IoFlags;
@@ -13,7 +12,7 @@ use pipewire::types::ObjectType;
 
 use super::PipeWireError;
 use super::session::Session;
-use super::wake::Waker;
+use super::wake::{Waker, WokenThread};
 
 /// Period between attempts to reach a daemon that does not run: each one only looks for its socket.
 const RETRY_PERIOD: Duration = Duration::from_secs(2);
@@ -21,10 +20,8 @@ const RETRY_PERIOD: Duration = Duration::from_secs(2);
 /// A thread that listens to the daemon's registry until it is dropped. Without a daemon it waits for one.
 #[derive(Debug)]
 pub struct SourceWatch {
-    waker: Waker,
-    stop: Arc<AtomicBool>,
     changed: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: WokenThread,
 }
 
 impl SourceWatch {
@@ -33,35 +30,24 @@ impl SourceWatch {
     /// # Errors
     /// The thread cannot be started.
     pub fn new() -> Result<Self, PipeWireError> {
-        let waker = Waker::new().map_err(PipeWireError::Thread)?;
-        let (stop, changed) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
-        let (waiter, end, change) = (waker.clone(), Arc::clone(&stop), Arc::clone(&changed));
-        let run = move || {
-            while !end.load(Ordering::Acquire) {
+        let changed = Arc::<AtomicBool>::default();
+        let change = Arc::clone(&changed);
+        let run = move |waker: &Waker, stop: &AtomicBool| {
+            while !stop.load(Ordering::Acquire) {
                 if super::is_available()
-                    && let Err(error) = watch_connection(&waiter, &end, &change)
+                    && let Err(error) = watch_connection(waker, stop, &change)
                 {
                     tracing::debug!("cameras of PipeWire are not watched: {error}");
                 }
-                waiter.wait(RETRY_PERIOD);
+                waker.wait(RETRY_PERIOD);
             }
         };
-        let thread = thread::Builder::new().name("pipewire-watch".into()).spawn(run).map_err(PipeWireError::Thread)?;
-        Ok(Self { waker, stop, changed, thread: Some(thread) })
+        Ok(Self { changed, _thread: WokenThread::start("pipewire-watch", run)? })
     }
 
     /// Whether sources came or went since the last call; those that are there at the start came.
     pub fn take_change(&self) -> bool {
         self.changed.swap(false, Ordering::AcqRel)
-    }
-}
-
-impl Drop for SourceWatch {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        self.waker.wake();
-        // A panic of the thread was printed already.
-        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 

@@ -10,15 +10,14 @@
 
 mod provider;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, mpsc};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use self::provider::Provider;
 use super::PipeWireError;
 use super::mode::{Mode, NegotiatedFormat};
-use super::wake::Waker;
+use super::wake::WokenThread;
 
 /// Longest wait for the node to appear in the daemon's graph.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -93,10 +92,8 @@ pub struct Counts {
 #[derive(Debug)]
 pub struct Node {
     name: String,
-    waker: Waker,
-    stop: Arc<AtomicBool>,
     counts: Arc<Counts>,
-    thread: Option<JoinHandle<()>>,
+    thread: WokenThread,
 }
 
 impl Node {
@@ -105,15 +102,11 @@ impl Node {
     /// # Errors
     /// The daemon does not run, or refuses.
     pub fn new(settings: Settings, pictures: impl PictureSource) -> Result<Self, PipeWireError> {
-        let waker = Waker::new().map_err(PipeWireError::Thread)?;
-        let (stop, counts) = (Arc::new(AtomicBool::new(false)), Arc::new(Counts::default()));
+        let counts = Arc::new(Counts::default());
         let (ready, is_ready) = mpsc::channel();
         let provider = Provider::new(settings, Box::new(pictures), Arc::clone(&counts));
-        let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
-        let thread =
-            thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&waker_handle, &end, &ready));
-        let thread = Some(thread.map_err(PipeWireError::Thread)?);
-        let mut node = Self { name: String::new(), waker, stop, counts, thread };
+        let thread = WokenThread::start("pipewire", move |waker, stop| provider.run(waker, stop, &ready))?;
+        let mut node = Self { name: String::new(), counts, thread };
         node.name = is_ready.recv_timeout(TIMEOUT).map_err(|_| PipeWireError::Silent)??;
         Ok(node)
     }
@@ -129,15 +122,6 @@ impl Node {
 
     /// Announces a new picture. Never blocks.
     pub fn wake(&self) {
-        self.waker.wake();
-    }
-}
-
-impl Drop for Node {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        self.waker.wake();
-        // A panic of the thread was printed already.
-        let _ = self.thread.take().map(JoinHandle::join);
+        self.thread.waker.wake();
     }
 }
