@@ -90,13 +90,10 @@ impl ExactnessDetector {
             return self.before.clear();
         }
         self.sample(map, color);
-        let (now, before) = (&self.now, &self.before);
-        let unsteady = if self.size == map.size() && before.len() == now.len() {
-            unsteady_fraction(now, before, (&mut self.changes, &mut self.sorted))
-        } else {
-            None
-        };
-        if let Some(unsteady) = unsteady {
+        if self.size == map.size()
+            && self.before.len() == self.now.len()
+            && let Some(unsteady) = unsteady_fraction(&self.now, &self.before, (&mut self.changes, &mut self.sorted))
+        {
             self.update_decision(map, unsteady);
         }
         self.size = map.size();

@@ -137,10 +137,9 @@ impl PipeWire {
         let (first, bytes) = (encoder.format(), encoder.picture_memory().bytes);
         let node = Node::new(settings, node_pictures)?;
         let pictures = Pool::new(MAX_IN_FLIGHT, || Picture { format: first, bytes: vec![0; bytes] });
-        let description = String::new();
         Ok(Self {
             node,
-            description,
+            description: String::new(),
             size: options.size,
             sender,
             pictures,
