@@ -1,9 +1,11 @@
 //! Limits of the blur radius and of the picture size.
 
 use super::cpu::MAX_WHOLE_PIXELS;
+use super::plan::Plan;
 use super::{BokehError, Method, Rank, Settings};
 use crate::compute::memory;
-use crate::optics::CocKind;
+use crate::frame::DepthMap;
+use crate::optics::{CocField, CocKind};
 
 /// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
 const MAX_GATHERED_PX: f32 = 512.0;
@@ -62,5 +64,17 @@ impl Settings {
         let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
         let by_method = (self.coc, self.method) == (CocKind::Depth, Method::Gather);
         Err(BokehError::TooWide { radius_px, max_px, size, by_method })
+    }
+}
+
+impl Plan {
+    /// Refuses a picture of another size than the plan's, and one without the depth that `coc` needs.
+    pub fn check_frame(&self, got: (u32, u32), depth: Option<&DepthMap>, coc: &CocField) -> Result<(), BokehError> {
+        let made_for = (self.width as u32, self.height as u32);
+        match (coc, depth) {
+            _ if got != made_for => Err(BokehError::Size { made_for, got }),
+            (CocField::Depth(_), None) => Err(BokehError::NoDepth),
+            _ => Ok(()),
+        }
     }
 }

@@ -8,7 +8,6 @@ use pulp::Arch;
 
 use super::encode::{EncodeTable, Encoder};
 use super::{BandedBokeh, CpuBokeh, Radii};
-use crate::bokeh::plan::Plan;
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::color::Picture16;
 use crate::compute::{Backend, simd};
@@ -27,7 +26,7 @@ impl CpuBokeh {
         coc: &CocField,
         out: &mut ColorImage,
     ) -> Result<PassTimes, BokehError> {
-        check_frame(&self.plan, color.size(), depth, coc)?;
+        self.plan.check_frame(color.size(), depth, coc)?;
         out.resize(color.width, color.height);
         Ok(time_passes(|lap| self.blur_pixels(&color.rgb, Radii::Field(coc, depth), &mut out.rgb, lap)))
     }
@@ -44,7 +43,7 @@ impl BandedBokeh {
         depth: Option<&DepthMap>,
         coc: &CocField,
     ) -> Result<Picture16, BokehError> {
-        check_frame(&self.plan, picture.size(), depth, coc)?;
+        self.plan.check_frame(picture.size(), depth, coc)?;
         self.encoder = Some(Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) }));
         let mut out = Picture16::new(picture.size(), picture.curves.clone());
         time_passes(|lap| self.blur_pixels(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb, lap));
@@ -68,7 +67,7 @@ fn time_passes(run: impl FnOnce(&mut dyn FnMut(&'static str) -> ControlFlow<()>)
 impl Bokeh for BandedBokeh {
     fn submit(&mut self, job: Job) -> Result<(), BokehError> {
         let Job { ticket, color, depth, coc, quality, mut out, .. } = job;
-        check_frame(&self.plan, color.size(), depth.as_deref(), &coc)?;
+        self.plan.check_frame(color.size(), depth.as_deref(), &coc)?;
         self.set_quality(quality);
         out.resize(color.width, color.height);
         let radii = Radii::Field(&coc, depth.as_deref());
@@ -96,17 +95,5 @@ impl Bokeh for BandedBokeh {
 
     fn describe(&self) -> String {
         format!("cpu, {} threads, {}", self.thread_count(), simd::instruction_set(Arch::new()))
-    }
-}
-
-/// Refuses a picture of another size than the plan's, and one without the depth that `coc` needs.
-fn check_frame(plan: &Plan, got: (u32, u32), depth: Option<&DepthMap>, coc: &CocField) -> Result<(), BokehError> {
-    let made_for = (plan.width as u32, plan.height as u32);
-    if got != made_for {
-        return Err(BokehError::Size { made_for, got });
-    }
-    match (coc, depth) {
-        (CocField::Depth(_), None) => Err(BokehError::NoDepth),
-        _ => Ok(()),
     }
 }

@@ -93,15 +93,6 @@ impl GpuBokeh {
         (self.plan.width as u32, self.plan.height as u32)
     }
 
-    fn check_job(&self, job: &Job) -> Result<(), BokehError> {
-        let (made_for, got) = (self.size(), job.color.size());
-        match job.coc {
-            _ if got != made_for => Err(BokehError::Size { made_for, got }),
-            CocField::Depth(_) if job.depth.is_none() => Err(BokehError::NoDepth),
-            _ => Ok(()),
-        }
-    }
-
     /// Uploads the depth map of a job, if its CoC follows it; returns it instead if it is on the device already.
     fn upload_depth<'a>(&mut self, job: &Job, shared: Option<&'a DeviceFrame>) -> Option<&'a wgpu::Buffer> {
         let (CocField::Depth(_), Some(map)) = (job.coc, &job.depth) else { return None };
@@ -189,7 +180,7 @@ fn resize_outputs(job: &mut Job, (width, height): (u32, u32)) {
 
 impl Bokeh for GpuBokeh {
     fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        self.check_job(&job)?;
+        self.plan.check_frame(job.color.size(), job.depth.as_deref(), &job.coc)?;
         if let Err(error) = self.device.check() {
             self.refused = Some(job);
             return Err(error.into());
