@@ -53,7 +53,7 @@ pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
 /// The result of a bin whose content has at least this radius, in pixels, may be reused; below, it follows details that
 /// the means of tiles do not show.
-pub const MIN_KEPT_RADIUS_PX: f32 = 5.0;
+const MIN_KEPT_RADIUS_PX: f32 = 5.0;
 
 /// A range of signed CoC, with the scale of its picture.
 #[derive(Clone, Debug, PartialEq)]

@@ -26,7 +26,7 @@ pub struct TimeBudget<'a> {
 
 impl TimeBudget<'static> {
     /// No limit.
-    pub const UNLIMITED: Self = Self { budget_ns: u64::MAX, period_ns: None, efforts: &[1.0], shares_depth: false };
+    const UNLIMITED: Self = Self { budget_ns: u64::MAX, period_ns: None, efforts: &[1.0], shares_depth: false };
 }
 
 /// The images of one frame: the picture, its depth, and the blurred result.

@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Side of a tile in pixels.
 pub const TILE: usize = 8;
 /// Means per tile: light of red, green and blue (squared codes, near linear light), and CoC in pixels.
-pub const MEANS: usize = 4;
+const MEANS: usize = 4;
 /// Change of luma and of chroma that counts, in codes of Y'CbCr, where the sensor has no noise.
 const BOUND: [f32; 2] = [0.6, 1.0];
 /// Largest bound on a noisy sensor.

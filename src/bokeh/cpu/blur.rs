@@ -23,7 +23,7 @@ use crate::compute::aligned::Aligned;
 use crate::compute::simd::{load, prefetch, store};
 
 /// Terms filtered at once; more are done in groups.
-pub const TERMS_PER_GROUP: usize = 4;
+const TERMS_PER_GROUP: usize = 4;
 
 /// One strip of one bin.
 pub struct Strip<'a> {

@@ -67,8 +67,8 @@ pub(super) struct Discriminant {
 }
 
 /// Lengths of [`Contrast::discriminant_params`] and of [`Contrast::foreground_params`].
-pub(super) const DISCRIMINANT_PARAMS: usize = 5;
-pub(super) const FOREGROUND_PARAMS: usize = 9;
+const DISCRIMINANT_PARAMS: usize = 5;
+const FOREGROUND_PARAMS: usize = 9;
 
 impl Discriminant {
     #[inline(always)]

@@ -114,7 +114,7 @@ impl Capture {
 }
 
 /// Returns the fraction of pixels in which two reduced pictures differ.
-pub fn differing_fraction(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
+fn differing_fraction(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
     let differ = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|p| (a[p] - b[p]).abs() > MIN_DIFFERENCE);
     a.iter().zip(b).filter(differ).count() as f32 / a.len().max(1) as f32
 }

@@ -93,7 +93,7 @@ pub fn quantize_depth(z_m: f32) -> u8 {
 }
 
 /// Returns the depth of a level, in metres.
-pub fn depth_of_level_m(level: u8) -> f32 {
+fn depth_of_level_m(level: u8) -> f32 {
     let [far, near] = RANGE_M.map(f32::recip);
     (far + (near - far) * f32::from(level) / 255.0).recip()
 }

@@ -71,7 +71,7 @@ impl BufferCounts {
     /// The item that a stage works on.
     const STAGE_BUFFERS: usize = 1;
 
-    pub fn color_buffers(&self) -> usize {
+    fn color_buffers(&self) -> usize {
         // Three stages with the links behind them, and the last stage: if nothing is blurred, the captured pictures
         // themselves go to the sink.
         3 * (Self::STAGE_BUFFERS + Self::LINK_BUFFERS) + Self::STAGE_BUFFERS + self.in_blur + self.viewer_buffers()
@@ -82,23 +82,23 @@ impl BufferCounts {
         if self.is_viewed { 3 * Self::STAGE_BUFFERS + Self::LINK_BUFFERS } else { 0 }
     }
 
-    pub fn depth_buffers(&self) -> usize {
+    fn depth_buffers(&self) -> usize {
         self.color_buffers()
     }
 
     /// Returns the buffers for original frames, from the replacement of the background until they are blurred.
-    pub fn original_buffers(&self) -> usize {
+    fn original_buffers(&self) -> usize {
         2 * Self::STAGE_BUFFERS + Self::LINK_BUFFERS + self.in_blur
     }
 
     /// Returns the buffers for the right camera, whose pictures go no further than the depth stage.
-    pub fn right_buffers(&self) -> usize {
+    fn right_buffers(&self) -> usize {
         2 * Self::STAGE_BUFFERS + Self::LINK_BUFFERS
     }
 
     /// Returns the buffers for blurred pictures: in the executor, the blur and deliver stages, and the link between
     /// them.
-    pub fn output_buffers(&self) -> usize {
+    fn output_buffers(&self) -> usize {
         if self.in_blur == 0 {
             0
         } else {

@@ -293,7 +293,7 @@ fn parse_size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
 }
 
 /// Lists the rates of a format at a size, as the driver reports them.
-pub fn list_rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
+fn list_rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     let mut discrete = Vec::new();
     for index in 0..MAX_ENTRIES {
         let mut entry = zeroed::<sys::v4l2_frmivalenum>();

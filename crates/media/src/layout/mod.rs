@@ -58,7 +58,7 @@ pub struct Component {
 
 impl Component {
     /// Returns the bytes of its plane up to the end of the last row, which may be unpadded.
-    pub fn end_bytes(&self) -> usize {
+    fn end_bytes(&self) -> usize {
         self.offset_bytes + self.stride_bytes * (self.rows - 1) + self.row_bytes
     }
 }

@@ -14,7 +14,7 @@ use super::upright::upright;
 use bokehcam::frame::Mask;
 
 /// Suffixes of the masks of pictures, after the picture's stem.
-pub const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
+const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
 
 /// Change of a value that lossy compression makes.
 const TOLERANCE: f32 = 8.0 / 255.0;

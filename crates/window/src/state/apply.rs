@@ -9,9 +9,9 @@ pub const NO_DEPTH: &str = "Nothing is known about depth here: use a small netwo
 pub const NO_DEPTH_OF_PHOTO: &str =
     "This photo has no depth. Install a network (`bokehcam models get`), or put a depth map beside it: NAME-depth.png.";
 /// Shown instead if the command line declined the source's depth.
-pub const DEPTH_DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
+const DEPTH_DECLINED: &str = "The depth of this source is off by `--depth none`. “Depth from” under More uses it.";
 /// Shown when the depth view is requested while depth is not computed.
-pub const DEPTH_NOT_COMPUTED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
+const DEPTH_NOT_COMPUTED: &str = "Depth is only computed while the blur uses it: switch Portrait on first.";
 /// Shown when a background plate is requested but the source is not a camera.
 pub const NO_PLATE: &str = "Open a camera first: a plate needs a camera that does not move.";
 /// Shown when a look needs metric depth but the depth is relative.

@@ -101,7 +101,7 @@ pub fn prior_bonus(likely: u16) -> impl Fn(u8) -> u8 {
 
 /// Returns the first `N` values.
 #[inline(always)]
-pub fn first_values<const N: usize>(values: &[u8]) -> &[u8; N] {
+fn first_values<const N: usize>(values: &[u8]) -> &[u8; N] {
     values.first_chunk().expect("rows are long enough")
 }
 

@@ -144,7 +144,7 @@ impl Control {
     }
 
     /// Describes the accepted values, as the hint of an error message.
-    pub fn describe_accepted(&self) -> String {
+    fn describe_accepted(&self) -> String {
         let steps = if self.step > 1 { format!(" in steps of {}", self.step) } else { String::new() };
         match self.kind {
             Kind::Integer | Kind::Integer64 => format!("use {} to {}{steps}", self.minimum, self.maximum),

@@ -10,9 +10,9 @@ use std::time::Duration;
 use super::{BufferInfo, ByteRange, Dequeued, Kernel, MAX_PLANES, Span, Wake};
 use bokehcam::clock::Clock;
 
-pub const EINTR: i32 = 4;
+const EINTR: i32 = 4;
 pub const EIO: i32 = 5;
-pub const EAGAIN: i32 = 11;
+const EAGAIN: i32 = 11;
 pub const EBUSY: i32 = 16;
 pub const ENODEV: i32 = 19;
 pub const EINVAL: i32 = 22;
