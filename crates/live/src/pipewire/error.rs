@@ -1,5 +1,8 @@
 use std::io;
 
+/// Result of what PipeWire is asked for.
+pub type Result<T, E = PipeWireError> = std::result::Result<T, E>;
+
 /// Why a PipeWire camera is not available.
 #[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]

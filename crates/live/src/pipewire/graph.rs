@@ -9,9 +9,9 @@ use pipewire::spa::param::ParamType;
 use pipewire::spa::utils::dict::DictRef;
 use pipewire::types::ObjectType;
 
-use super::PipeWireError;
 use super::mode::{self, Mode};
 use super::session::Session;
+use super::{PipeWireError, Result};
 
 /// Longest wait for the daemon to list its objects.
 const TIMEOUT: Duration = Duration::from_secs(3);
@@ -61,7 +61,7 @@ impl Graph {
     ///
     /// # Errors
     /// The daemon does not run, or does not answer.
-    pub fn list_without_modes() -> Result<Self, PipeWireError> {
+    pub fn list_without_modes() -> Result<Self> {
         Self::list_objects(&Session::open()?, |_| false)
     }
 
@@ -69,7 +69,7 @@ impl Graph {
     ///
     /// # Errors
     /// The daemon does not run, or does not answer.
-    pub fn list_with_modes() -> Result<Self, PipeWireError> {
+    pub fn list_with_modes() -> Result<Self> {
         Self::list_objects(&Session::open()?, |_| true)
     }
 
@@ -77,7 +77,7 @@ impl Graph {
     ///
     /// # Errors
     /// No camera matches, several do, or the session manager does not support filters.
-    pub fn find_filter_target(name: &str) -> Result<Camera, PipeWireError> {
+    pub fn find_filter_target(name: &str) -> Result<Camera> {
         let session = Session::open()?;
         if !Self::list_objects(&session, |_| false)?.has_filters {
             return Err(PipeWireError::NoFilters);
@@ -89,7 +89,7 @@ impl Graph {
     ///
     /// # Errors
     /// No camera matches, several do, or this program itself provides it.
-    pub(super) fn find_camera(session: &Session, name: &str, exactly: bool) -> Result<Camera, PipeWireError> {
+    pub(super) fn find_camera(session: &Session, name: &str, exactly: bool) -> Result<Camera> {
         let wanted = name.to_lowercase();
         let has_part = move |source: &Source| {
             [&source.name, &source.label].into_iter().any(|text| text.to_lowercase().contains(&wanted))
@@ -121,10 +121,7 @@ impl Graph {
 
     /// Lists the objects of the daemon that a session is connected to, with the modes of the sources for which
     /// `wants_modes` is true.
-    pub(super) fn list_objects(
-        session: &Session,
-        wants_modes: impl Fn(&Source) -> bool + 'static,
-    ) -> Result<Self, PipeWireError> {
+    pub(super) fn list_objects(session: &Session, wants_modes: impl Fn(&Source) -> bool + 'static) -> Result<Self> {
         let registry = session.core.get_registry_rc().map_err(PipeWireError::refused("its registry"))?;
         let found: Rc<RefCell<Listing>> = Rc::default();
         let (finder, objects) = (Rc::clone(&found), registry.downgrade());

@@ -17,6 +17,7 @@ mod wake;
 pub mod watch;
 
 pub use error::PipeWireError;
+use error::Result;
 
 /// Returns the link group of the nodes with which this program filters a camera: group members are not connected to the
 /// filter itself.

@@ -16,12 +16,12 @@ use pipewire::spa::support::system::IoFlags;
 use pipewire::spa::utils::Direction;
 use pipewire::stream::{Stream, StreamFlags, StreamRc, StreamState};
 
-use super::PipeWireError;
 use super::graph::{Camera, Graph};
 use super::mode::{self, Mode, NegotiatedFormat};
 use super::param;
 use super::session::Session;
 use super::wake::{Waker, WokenThread};
+use super::{PipeWireError, Result};
 use bokehcam::clock::Clock;
 
 /// Longest wait for a camera's first format, from the request on.
@@ -74,7 +74,7 @@ pub struct Reader {
 }
 
 /// Channel that receives, once, the camera and its format, or the error.
-type Ready = mpsc::Sender<Result<(Camera, NegotiatedFormat), PipeWireError>>;
+type Ready = mpsc::Sender<Result<(Camera, NegotiatedFormat)>>;
 
 impl Reader {
     /// Starts to read from the camera that `name` refers to: its identifying name, its label, or a part of either. With
@@ -83,11 +83,7 @@ impl Reader {
     ///
     /// # Errors
     /// The daemon does not run, no camera matches, or it offers no usable mode.
-    pub fn new(
-        name: &str,
-        filters: bool,
-        handler: impl PictureHandler,
-    ) -> Result<(Self, Camera, NegotiatedFormat), PipeWireError> {
+    pub fn new(name: &str, filters: bool, handler: impl PictureHandler) -> Result<(Self, Camera, NegotiatedFormat)> {
         let is_wanted = Arc::new(AtomicBool::new(true));
         let (ready, is_ready) = mpsc::channel();
         let listener = Listener {
@@ -172,12 +168,7 @@ impl Listener {
     ///
     /// # Errors
     /// The daemon or the camera is absent, or refuses.
-    fn run_connection(
-        self: &Rc<Self>,
-        name: &str,
-        waker: &Waker,
-        [stop, wanted]: [&AtomicBool; 2],
-    ) -> Result<(), PipeWireError> {
+    fn run_connection(self: &Rc<Self>, name: &str, waker: &Waker, [stop, wanted]: [&AtomicBool; 2]) -> Result<()> {
         let session = Session::open()?;
         // Once a camera was found, only that one is accepted.
         let known = self.camera.borrow().as_ref().map(|camera| camera.name.clone());
@@ -224,7 +215,7 @@ impl Listener {
         Ok(())
     }
 
-    fn create_stream(&self, session: &Session, camera: &Camera, is_passive: bool) -> Result<StreamRc, PipeWireError> {
+    fn create_stream(&self, session: &Session, camera: &Camera, is_passive: bool) -> Result<StreamRc> {
         let mut props = properties! {
             *pipewire::keys::MEDIA_TYPE => "Video",
             *pipewire::keys::MEDIA_CATEGORY => "Capture",

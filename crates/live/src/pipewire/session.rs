@@ -9,7 +9,7 @@ use pipewire::core::{CoreRc, Listener};
 use pipewire::loop_::Timeout;
 use pipewire::main_loop::MainLoopRc;
 
-use super::PipeWireError;
+use super::{PipeWireError, Result};
 
 /// A connection. The fields are dropped in this order: the listener, the connection, the loop that runs it.
 pub struct Session {
@@ -31,7 +31,7 @@ impl Session {
     ///
     /// # Errors
     /// The daemon does not run, or refuses.
-    pub fn open() -> Result<Self, PipeWireError> {
+    pub fn open() -> Result<Self> {
         pipewire::init();
         super::log::disable_log();
         let main_loop = MainLoopRc::new(None).map_err(PipeWireError::refused("a loop"))?;
@@ -81,7 +81,7 @@ impl Session {
     }
 
     /// Requests a round trip to the daemon, and returns its number for [`Session::is_synced`].
-    pub fn sync(&self) -> Result<i32, PipeWireError> {
+    pub fn sync(&self) -> Result<i32> {
         self.core.sync(0).map(|seq| seq.seq()).map_err(PipeWireError::refused("a question"))
     }
 

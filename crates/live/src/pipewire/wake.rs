@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 
-use super::PipeWireError;
+use super::{PipeWireError, Result};
 
 /// Wakes the loop that polls [`Waker::descriptor`]. Clones share one eventfd.
 #[derive(Clone, Debug)]
@@ -60,7 +60,7 @@ impl WokenThread {
     ///
     /// # Errors
     /// The system refuses the thread, or its eventfd.
-    pub fn start(name: &str, run: impl FnOnce(&Waker, &AtomicBool) + Send + 'static) -> Result<Self, PipeWireError> {
+    pub fn start(name: &str, run: impl FnOnce(&Waker, &AtomicBool) + Send + 'static) -> Result<Self> {
         let (waker, stop) = (Waker::new().map_err(PipeWireError::Thread)?, Arc::<AtomicBool>::default());
         let (waker_handle, end) = (waker.clone(), Arc::clone(&stop));
         let thread = thread::Builder::new().name(name.into()).spawn(move || run(&waker_handle, &end));

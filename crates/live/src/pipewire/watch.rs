@@ -10,9 +10,9 @@ use std::time::Duration;
 use pipewire::spa::support::system::IoFlags;
 use pipewire::types::ObjectType;
 
-use super::PipeWireError;
 use super::session::Session;
 use super::wake::{Waker, WokenThread};
+use super::{PipeWireError, Result};
 
 /// Period between attempts to reach a daemon that does not run: each one only looks for its socket.
 const RETRY_PERIOD: Duration = Duration::from_secs(2);
@@ -29,7 +29,7 @@ impl SourceWatch {
     ///
     /// # Errors
     /// The thread cannot be started.
-    pub fn new() -> Result<Self, PipeWireError> {
+    pub fn new() -> Result<Self> {
         let changed = Arc::<AtomicBool>::default();
         let change = Arc::clone(&changed);
         let run = move |waker: &Waker, stop: &AtomicBool| {
@@ -52,7 +52,7 @@ impl SourceWatch {
 }
 
 /// Watches until `stop` is set or the connection is lost; sets `changed` with every source that comes or goes.
-fn watch_connection(waker: &Waker, stop: &AtomicBool, changed: &Arc<AtomicBool>) -> Result<(), PipeWireError> {
+fn watch_connection(waker: &Waker, stop: &AtomicBool, changed: &Arc<AtomicBool>) -> Result<()> {
     let session = Session::open()?;
     let registry = session.core.get_registry_rc().map_err(PipeWireError::refused("its registry"))?;
     let sources: Rc<RefCell<HashSet<u32>>> = Rc::default();

@@ -15,9 +15,9 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use self::provider::Provider;
-use super::PipeWireError;
 use super::mode::{Mode, NegotiatedFormat};
 use super::wake::WokenThread;
+use super::{PipeWireError, Result};
 
 /// Longest wait for the node to appear in the daemon's graph.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -101,7 +101,7 @@ impl Node {
     ///
     /// # Errors
     /// The daemon does not run, or refuses.
-    pub fn new(settings: Settings, pictures: impl PictureSource) -> Result<Self, PipeWireError> {
+    pub fn new(settings: Settings, pictures: impl PictureSource) -> Result<Self> {
         let counts = Arc::new(Counts::default());
         let (ready, is_ready) = mpsc::channel();
         let provider = Provider::new(settings, Box::new(pictures), Arc::clone(&counts));

@@ -14,11 +14,11 @@ use pipewire::spa::utils::Direction;
 use pipewire::stream::{StreamFlags, StreamRc, StreamState};
 
 use super::{Counts, DrawnPicture, PictureMemory, PictureSource, Settings};
-use crate::pipewire::PipeWireError;
 use crate::pipewire::buffer::{self, Header};
 use crate::pipewire::graph::Graph;
 use crate::pipewire::session::Session;
 use crate::pipewire::wake::Waker;
+use crate::pipewire::{PipeWireError, Result};
 use crate::pipewire::{mode, param};
 use bokehcam::clock::Clock;
 
@@ -58,7 +58,7 @@ enum Pending {
 }
 
 /// Channel that receives, once, the node's name, or the error.
-pub(super) type Ready = mpsc::Sender<Result<String, PipeWireError>>;
+pub(super) type Ready = mpsc::Sender<Result<String>>;
 
 impl Provider {
     pub(super) fn new(settings: Settings, pictures: Box<dyn PictureSource>, counts: Arc<Counts>) -> Self {
@@ -107,7 +107,7 @@ impl Provider {
     }
 
     /// Returns the name, with a number appended if another node has it.
-    fn find_free_name(&self, session: &Session) -> Result<String, PipeWireError> {
+    fn find_free_name(&self, session: &Session) -> Result<String> {
         let taken = Graph::list_objects(session, |_| false)?.names;
         let name = &self.settings.name;
         let numbered = (2..).map(|number| format!("{name}-{number}"));
@@ -137,12 +137,7 @@ impl Provider {
     ///
     /// # Errors
     /// The daemon does not run, or refuses.
-    fn run_connection(
-        self: &Rc<Self>,
-        waker: &Waker,
-        stop: &AtomicBool,
-        ready: &mut Option<&Ready>,
-    ) -> Result<(), PipeWireError> {
+    fn run_connection(self: &Rc<Self>, waker: &Waker, stop: &AtomicBool, ready: &mut Option<&Ready>) -> Result<()> {
         let session = Session::open()?;
         let stream = self.create_stream(&session)?;
         let failure = Rc::new(RefCell::new(None));
@@ -208,7 +203,7 @@ impl Provider {
         }
     }
 
-    fn create_stream(&self, session: &Session) -> Result<StreamRc, PipeWireError> {
+    fn create_stream(&self, session: &Session) -> Result<StreamRc> {
         let Settings { name, label, filter_target, .. } = &self.settings;
         let mut props = properties! {
             *pipewire::keys::MEDIA_CLASS => "Video/Source",
