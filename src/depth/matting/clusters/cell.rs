@@ -172,12 +172,15 @@ fn cluster_fringe(
     corner @ (left, top): (usize, usize),
 ) -> Cluster {
     let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
-    for (place, value) in set_bits(edges).map(|place| (place, values[place])).filter(|&(_, value)| value > middle) {
-        let (x, y) = (place % CELL_PX, place / CELL_PX);
-        let light = view.light((top + y) * view.size.0 + left + x);
-        let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer_product(light));
-        sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
-        of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
+    for place in set_bits(edges) {
+        let value = values[place];
+        if value > middle {
+            let (x, y) = (place % CELL_PX, place / CELL_PX);
+            let light = view.light((top + y) * view.size.0 + left + x);
+            let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer_product(light));
+            sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
+            of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
+        }
     }
     Cluster::new(sums, of_place, corner)
 }
