@@ -80,9 +80,8 @@ impl<'a> Stage<'a> {
         let stopped = || stop.iter().any(|stop| stop.load(Ordering::Relaxed));
         // Stand-ins for a camera that brings neither; they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
-        let mut has_warned = false;
         let seeker = self.camera.seeker();
-        let (mut seek, mut ahead_ns) = (0, 0);
+        let (mut seek, mut ahead_ns, mut has_warned) = (0, 0, false);
         while !stopped() {
             let request = seeker.as_ref().and_then(|seeker| seeker.newer_request(seek));
             if let Some(request) = request {

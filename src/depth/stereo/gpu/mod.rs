@@ -59,7 +59,6 @@ impl GpuExecutor {
         let ((width, height), disparities) = (size, fixed::candidate_count(disparities));
         let pixels = width * height;
         check_limits(device, size, disparities)?;
-
         use wgpu::BufferUsages as Usage;
         let buffer = |label, bytes, usage| device.create_buffer(label, bytes, usage);
         let luma = buffer("luma", 2 * pixels.next_multiple_of(4), Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
