@@ -60,7 +60,6 @@ impl Opened {
             SourceName::Camera(camera) => cameras::open(camera, frames)?,
             SourceName::Cameras(pair) => cameras::open_pair(pair, frames)?,
             SourceName::PipeWire(name) => pipewire_cameras::open(name, request.options.filters, frames)?,
-            }
         }))
     }
 
