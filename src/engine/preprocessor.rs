@@ -208,7 +208,7 @@ impl Preprocessor {
         self.coc.adapt_reused_map(map, color, field);
     }
 
-    /// Replaces the background behind the subject of a picture whose depth is finished ([`Composer::compose`]). If that
+    /// Replaces the background behind the subject of a picture whose depth is finished (`Composer::compose`). If that
     /// changes the frame and `originals` is given, the original is kept in one of its buffers. `kept_parts` has buffers for
     /// results with an alpha channel.
     pub fn compose(

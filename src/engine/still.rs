@@ -51,14 +51,16 @@ pub fn compute_coc_and_depth(
     prepare(look, color, depth, threads).map(|(coc, depth, _)| (coc, depth))
 }
 
-/// Does the same as [`compute_coc_and_depth`] for any background; returns what is kept of the picture before a
-/// transparent one, too.
+/// The CoC and depth of a picture, and what is kept of it before a transparent background.
+type Prepared = (CocField, Option<DepthMap>, Option<Pooled<Images>>);
+
+/// Does the same as [`compute_coc_and_depth`] for any background.
 fn prepare(
     look: &Look,
     color: &mut ColorImage,
     depth: Option<Depth>,
     threads: Option<usize>,
-) -> Result<(CocField, Option<DepthMap>, Option<Pooled<Images>>), BokehError> {
+) -> Result<Prepared, BokehError> {
     let (depth, mut map) = match depth {
         Some(Depth::Measured(map)) => (Origin::Single, Some(map)),
         Some(Depth::Final(map)) => (Origin::Finished, Some(map)),

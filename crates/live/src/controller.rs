@@ -9,12 +9,17 @@ use crate::sink::ShutterControl;
 use crate::source::{DepthOrigin, Kind};
 use bokehcam::look::{Change, Look, LookError, Patch};
 
+/// Returns the current settings of a preset.
+pub type LoadPreset = dyn Fn(&str) -> Result<Patch, Answer> + Send + Sync;
+/// Returns one line on the settings of a change that have no effect in the run.
+pub type DescribeUnused = dyn Fn(&Patch, &Changed) -> Option<String> + Send + Sync;
+
 /// What the command line of a run adds to the rules of looks. A refusal is returned as the answer.
 pub struct CommandLine {
-    /// Returns the current settings of a preset.
-    pub load_preset: Box<dyn Fn(&str) -> Result<Patch, Answer> + Send + Sync>,
-    /// Returns one line on the settings that have no effect in the run.
-    pub describe_unused: Box<dyn Fn(&Patch, &Changed) -> Option<String> + Send + Sync>,
+    /// Finds presets.
+    pub load_preset: Box<LoadPreset>,
+    /// Judges changes.
+    pub describe_unused: Box<DescribeUnused>,
 }
 
 /// The result of a change of the look.

@@ -17,8 +17,6 @@ use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, YuyvImage};
 use bokehcam::link::demand::Demand;
 
-/// Result of writing a picture ([`Sink::write_frame`]).
-
 /// A sink whose pictures can be blocked through its [`ShutterControl`]. The card is shown at once, also between two frames;
 /// from then on the camera is released: no client counts as watching. After reopening, the card is repeated at the
 /// frame rate until the next picture.

@@ -2,7 +2,7 @@
 //!
 //! In an empty folder files are written directly, each atomically. With permission to replace, those of a folder that is
 //! not empty go to a new one beside it, `NAME.incomplete`, which takes its place once it is complete; so the old folder
-//! is never lost, and a killed run leaves both. The list [`LIST_NAME`] in a folder names the files that this program
+//! is never lost, and a killed run leaves both. The list `.bokehcam` in a folder names the files that this program
 //! wrote: a folder with any other file is never replaced.
 
 use std::collections::HashSet;

@@ -27,7 +27,9 @@ impl BuiltIn {
         let threads = Arc::new(ThreadPool::with_num_threads(1));
         let limit = MemoryLimit::of_thread();
         threads.run(|| {
-            limit.map(MemoryLimit::apply);
+            if let Some(limit) = limit {
+                limit.apply();
+            }
             expect_panics();
         });
         Ok(Network { engine: Box::new(Self { model, threads }), inputs, outputs, runtime: "rten" })
