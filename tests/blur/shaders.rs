@@ -2,6 +2,7 @@
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
+use std::ffi::OsStr;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
@@ -64,18 +65,23 @@ fn every_file_is_a_pass_or_shared_and_short() {
     };
     let folders = entries(Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
     for path in folders.flat_map(entries) {
-        let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let shared = "base cells common filter list meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo work \
-             yuyv stereo_common stereo_line \
-             stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
-             refine_window matte_common matte_background matte_claim matte_compare matte_contrast matte_enter matte_light \
-             matte_prior matte_sum matte_surfaces matte_run matte_weights";
-        let known = shared.split(' ').any(|file| file == name)
+        let part = |part: Option<&OsStr>| part.and_then(OsStr::to_str).unwrap_or_default().to_owned();
+        let (folder, file) = (part(path.parent().and_then(Path::file_name)), part(path.file_stem()));
+        let shared = match folder.as_str() {
+            "blur" => {
+                "base cells common filter list meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo \
+                 work yuyv"
+            }
+            "stereo" => "common line path root row touch",
+            "refine" => "common ends lanes select window",
+            _ => "background claim common compare contrast enter light prior run sum surfaces weights",
+        };
+        let pass = if folder == "blur" { file.clone() } else { format!("{folder}_{file}") };
+        let known = shared.split(' ').any(|shared| shared == file)
             || [&ALL[..], &stereo::ALL, &refine::ALL, &matte::ALL, &[stereo::RECTIFY]]
                 .concat()
                 .iter()
-                .any(|shader| shader.name == name)
-            || name == "present";
+                .any(|shader| shader.name == pass);
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
         assert!(lines <= 150, "{} has {lines} lines", path.display());

@@ -5,8 +5,8 @@ use super::devices::Choice;
 use super::{Frames, SourceError, SourceName};
 use crate::capture::Camera;
 use crate::capture::pipewire::PipeWireCamera;
-use crate::pipewire;
 use crate::pipewire::graph::{Graph, Source};
+use crate::pipewire::is_available;
 pub use crate::pipewire::watch::SourceWatch;
 
 /// Parses the name after `pipewire:`; its existence is checked when it is opened.
@@ -37,7 +37,7 @@ pub fn list_pipewire_cameras() -> Vec<Choice> {
 
 /// Returns the camera that this program would offer in PipeWire, if PipeWire runs.
 pub fn find_output() -> Option<Choice> {
-    pipewire::is_available().then(|| Choice { name: "pipewire".to_owned(), label: "bokehcam (PipeWire)".to_owned() })
+    is_available().then(|| Choice { name: "pipewire".to_owned(), label: "bokehcam (PipeWire)".to_owned() })
 }
 
 /// Watches for cameras that come and go, if PipeWire runs.

@@ -59,13 +59,6 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
     }
     let mut photo = Photo::read(&image)?;
     photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
-    let is_itself = |file: &&PathBuf| place::resolve_links(file) == place::resolve_links(&image);
-    // A cut-out is its own mask.
-    if let Some(file) = command.depth_map.as_ref().or(command.mask.as_ref()).filter(is_itself)
-        && photo.alpha.is_none()
-    {
-        log::warn(&format!("{}: this is the picture itself, not its depth or mask", file.display()));
-    }
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
     let own_px = photo.color.size();
     transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;
@@ -81,6 +74,13 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         (input.depth, input.depth_from) = (Some(Depth::Final(map)), from);
     } else if command.image.is_some() && searches_depth && look.effect.follows_depth() {
         find_depth(&image, command, look, &mut input)?;
+    }
+    let is_itself = |file: &&PathBuf| place::resolve_links(file) == place::resolve_links(&image);
+    // A cut-out is its own mask.
+    if let Some(file) = command.depth_map.as_ref().or(command.mask.as_ref()).filter(is_itself)
+        && input.photo.alpha.is_none()
+    {
+        log::warn(&format!("{}: this is the picture itself, not its depth or mask", file.display()));
     }
     Ok(input)
 }
