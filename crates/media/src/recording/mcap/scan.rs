@@ -16,6 +16,7 @@ use super::fields::Fields;
 use super::message::{MAX_MESSAGE_BYTES, Preview};
 use super::topic::Message;
 use crate::recording::MAX_ENTRIES;
+use crate::recording::fault::PictureFault;
 
 /// The first and the last bytes of a file.
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -267,6 +268,8 @@ impl Scanner<'_> {
     ) -> Result<Option<u64>, Damage> {
         let mut head = [0; CHUNK_HEAD_BYTES as usize];
         reader.read_exact(&mut head)?;
+        // After two times (16 bytes): decompressed bytes, their CRC-32, and the length of the compression's name, which
+        // follows, with the length of the records.
         let mut fields = Fields::packed(&head[16..]);
         let (bytes, crc) = (fields.u64().unwrap_or_default(), fields.u32().unwrap_or_default());
         let name_bytes = fields.u32().unwrap_or_default() as usize;
@@ -286,26 +289,27 @@ impl Scanner<'_> {
             reader.seek(io::SeekFrom::Start(next))?;
             return Ok(None);
         }
-        let name = String::from_utf8_lossy(&name).into_owned();
         self.bytes_left = self.bytes_left.checked_sub(bytes).ok_or_else(|| {
             Damage::Fault(format!("its chunks are compressed to less than a {MAX_RATIO}th, as no recording is"))
         })?;
-        let number = self.found.chunks.len() as u32;
-        match Chunk::new(&name, coded_at, coded_bytes, bytes, crc).and_then(|chunk| Ok((chunk.read(self.file)?, chunk)))
-        {
-            Ok((records, chunk)) => {
-                self.found.chunks.push(chunk);
-                let mut inside_at = 0;
-                let scanned =
-                    self.scan_records(&mut Cursor::new(&records), &mut inside_at, records.len() as u64, Some(number));
-                if let Err(Damage::Fault(what)) = scanned {
-                    self.note_damage(format!("{what} in the chunk at byte {at}"));
-                }
-            }
+        let chunk = Chunk::new(&String::from_utf8_lossy(&name), coded_at, coded_bytes, bytes, crc);
+        if let Err(fault) = chunk.and_then(|chunk| self.scan_compressed(chunk, at)) {
             // The chunks after it can be read.
-            Err(fault) => self.note_damage(format!("the chunk at byte {at} is left out: {fault}")),
+            self.note_damage(format!("the chunk at byte {at} is left out: {fault}"));
         }
         reader.seek(io::SeekFrom::Start(next))?;
         Ok(None)
+    }
+
+    /// Decompresses a chunk, whose record has its content at `at`, and scans its records.
+    fn scan_compressed(&mut self, chunk: Chunk, at: u64) -> Result<(), PictureFault> {
+        let records = chunk.read(self.file)?;
+        let number = self.found.chunks.len() as u32;
+        self.found.chunks.push(chunk);
+        let scanned = self.scan_records(&mut Cursor::new(&records), &mut 0, records.len() as u64, Some(number));
+        if let Err(Damage::Fault(what)) = scanned {
+            self.note_damage(format!("{what} in the chunk at byte {at}"));
+        }
+        Ok(())
     }
 }
