@@ -82,21 +82,22 @@ impl Engine for Tflite {
 }
 
 impl Step {
+    /// Computes the picture `out` from those in `slots`; overwrites `scratch`.
     fn run(&self, slots: &[Vec<f32>], out: &mut [f32], scratch: &mut [f32], arch: Arch) {
         let (size, result, activation) = (self.size, self.result, self.activation);
         let input = &slots[self.input][..size.len()];
         let (pixels, plane) = (size.pixels(), result.plane());
-        let seen = |slot: &Option<usize>| slot.map(|slot| &slots[slot][..size.len()]);
+        let operand = |slot: &Option<usize>| slot.map(|slot| &slots[slot][..size.len()]);
         match &self.operation {
-            Operation::Pointwise { weights, bias, under: None } => {
+            Operation::Pointwise { weights, bias, unfolded: None } => {
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out, plane });
             }
-            Operation::Pointwise { weights, bias, under: Some((axes, under)) } => {
-                let (pixels, row_len) = (under.pixels(), under.plane());
-                let input_row = &mut scratch[..under.len()];
+            Operation::Pointwise { weights, bias, unfolded: Some((axes, unfolded)) } => {
+                let (pixels, row_len) = (unfolded.pixels(), unfolded.plane());
+                let input_row = &mut scratch[..unfolded.len()];
                 input_row.fill(0.0);
                 for row in 0..result.rows {
-                    im2col_row(input, &size, axes, row, under, input_row);
+                    im2col_row(input, &size, axes, row, unfolded, input_row);
                     let out = &mut out[row * row_len..];
                     arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
                 }
@@ -108,19 +109,19 @@ impl Step {
             Operation::TransposedConvolution { weights, bias } => {
                 let (lanes, sums) = (size.lanes, &mut scratch[..pixels * bias.len()]);
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
-                for (y, out) in out.chunks_exact_mut(result.columns).enumerate() {
-                    let (row, down) = (y / 2 * size.columns, y % 2);
-                    for (x, out) in out.iter_mut().enumerate() {
-                        let four = 2 * down + x % 2;
-                        *out = sums[four / lanes * size.plane() + (row + x / 2) * lanes + four % lanes];
+                // Pixel shuffle: the four channels of a pixel are 2x2 pixels of the result.
+                for (y, row) in out.chunks_exact_mut(result.columns).enumerate() {
+                    for (x, value) in row.iter_mut().enumerate() {
+                        let (pixel, channel) = (y / 2 * size.columns + x / 2, 2 * (y % 2) + x % 2);
+                        *value = sums[channel / lanes * size.plane() + pixel * lanes + channel % lanes];
                     }
                 }
             }
             Operation::Elementwise { gate, b } => {
                 let gate = gate.map(|slot| &slots[slot][..]);
-                arch.dispatch(Elementwise { a: input, gate, b: seen(b), activation, out, plane });
+                arch.dispatch(Elementwise { a: input, gate, b: operand(b), activation, out, plane });
             }
-            Operation::Mean { b } => arch.dispatch(Mean { a: input, b: seen(b), out, plane: size.plane() }),
+            Operation::Mean { b } => arch.dispatch(Mean { a: input, b: operand(b), out, plane: size.plane() }),
             Operation::Upsample => {
                 let row = &mut scratch[..size.columns * size.lanes];
                 arch.dispatch(Upsample { input, size, row, out });

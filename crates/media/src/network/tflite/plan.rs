@@ -14,11 +14,11 @@ const MAX_WORK: usize = 1 << 35;
 
 /// The operation of a step.
 pub enum Operation {
-    /// Pointwise convolution, of the pixels themselves or of an im2col row (`under`).
+    /// Pointwise convolution, of the pixels themselves or of rows that im2col unfolds to this size.
     Pointwise {
         weights: Vec<f32>,
         bias: Vec<f32>,
-        under: Option<([Axis; 2], Size)>,
+        unfolded: Option<([Axis; 2], Size)>,
     },
     /// Depthwise convolution; `lines` is the size of its ring buffer.
     Depthwise {

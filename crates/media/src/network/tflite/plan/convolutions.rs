@@ -20,7 +20,7 @@ impl Planner<'_> {
         if !alone {
             self.reserve_scratch(row.len())?;
         }
-        let operation = Operation::Pointwise { weights, bias, under: (!alone).then_some((axes, row)) };
+        let operation = Operation::Pointwise { weights, bias, unfolded: (!alone).then_some((axes, row)) };
         Ok(Some(Planned { operation, size: Size { rows, columns, channels: out, ..size }, work: depth }))
     }
 
