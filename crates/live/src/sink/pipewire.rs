@@ -72,7 +72,7 @@ impl PipeWire {
     pub fn open(label: Option<&str>, options: &Options) -> Result<Self, SinkError> {
         let label = label.unwrap_or(DEFAULT_NAME);
         let camera =
-            Self::new(label, (node_name(label), None), |default_format| vec![default_format.to_mode()], options)?;
+            Self::new(label, node_name(label), None, |default_format| vec![default_format.to_mode()], options)?;
         let (width, height) = camera.encoder.format().size();
         let description = format!("PipeWire camera {} ({label}), YUY2 {width}x{height}", camera.node.name());
         Ok(Self { description, ..camera })
@@ -92,17 +92,18 @@ impl PipeWire {
             return Err(PipeWireError::NoMode { name: camera.name, why }.into());
         }
         let label = format!("{}, blurred", camera.label);
-        let name = (format!("{DEFAULT_NAME}.{}", camera.name), Some(camera.name.clone()));
-        let filter = Self::new(&label, name, |_| modes, options)?;
+        let name = format!("{DEFAULT_NAME}.{}", camera.name);
+        let filter = Self::new(&label, name, Some(camera.name.clone()), |_| modes, options)?;
         let description = format!("all readers of pipewire:{} ({})", camera.name, camera.label);
         Ok(Self { description, ..filter })
     }
 
-    /// Creates a node, which may stand in for a camera, with the modes that `modes` returns for the node's default
-    /// mode.
+    /// Creates the node `name`, which replaces the camera `filter_target` if given, with the modes that `modes` returns
+    /// for the default mode.
     fn new(
         label: &str,
-        (name, filter_target): (String, Option<String>),
+        name: String,
+        filter_target: Option<String>,
         modes: impl FnOnce(&NegotiatedFormat) -> Vec<Mode>,
         options: &Options,
     ) -> Result<Self, SinkError> {
@@ -121,18 +122,8 @@ impl PipeWire {
             hold: (2 * Duration::from_nanos(options.period_ns)).clamp(REPEAT_INTERVAL.0, REPEAT_INTERVAL.1),
         };
         let (sender, receiver) = link::live();
-        let (is_watched, format) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::default()));
-        let mut node_pictures = NodePictures {
-            receiver,
-            frame: None,
-            is_new: false,
-            card: Picture { format: Format::from(&default_format), bytes: Vec::new() },
-            format: Arc::clone(&format),
-            demand: options.demand.clone(),
-            watch: None,
-            is_watched: Arc::clone(&is_watched),
-        };
-        node_pictures.set_format(&default_format);
+        let node_pictures = NodePictures::new(receiver, &default_format, options.demand.clone());
+        let (is_watched, format) = (Arc::clone(&node_pictures.is_watched), Arc::clone(&node_pictures.format));
         let encoder = Encoder::new(Format::from(&default_format)).ok_or(SinkError::Yuyv)?;
         let (first, bytes) = (encoder.format(), encoder.picture_memory().bytes);
         let node = Node::new(settings, node_pictures)?;
@@ -262,6 +253,24 @@ struct NodePictures {
     demand: Option<Demand>,
     watch: Option<Watch>,
     is_watched: Arc<AtomicBool>,
+}
+
+impl NodePictures {
+    /// Creates the card in `format`, shown until `receiver` has a picture. `demand` is told while a client watches.
+    fn new(receiver: Receiver<Frame>, format: &NegotiatedFormat, demand: Option<Demand>) -> Self {
+        let mut pictures = Self {
+            receiver,
+            frame: None,
+            is_new: false,
+            card: Picture { format: Format::from(format), bytes: Vec::new() },
+            format: Arc::default(),
+            demand,
+            watch: None,
+            is_watched: Arc::default(),
+        };
+        pictures.set_format(format);
+        pictures
+    }
 }
 
 impl PictureSource for NodePictures {
