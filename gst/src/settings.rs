@@ -66,7 +66,7 @@ fn param_spec(property: Property) -> glib::ParamSpec {
                 "The property {} as a number of {unit}, for controllers; {NO_NUMBER} if it is not such a number",
                 property_name(setting)
             );
-            let nick = nick(name);
+            let nick = format_nick(name);
             let number = glib::ParamSpecFloat::builder(name).nick(&nick).blurb(&blurb);
             number.minimum(NO_NUMBER).maximum(*max).default_value(NO_NUMBER).controllable().mutable_playing().build()
         }
@@ -107,33 +107,34 @@ fn param_spec(property: Property) -> glib::ParamSpec {
     }
 }
 
+/// Returns the specification of a setting: an enumeration if it has choices, a number if it has a range, else a text.
 fn setting_spec(setting: &Setting) -> glib::ParamSpec {
-    let (nick, blurb) = (nick(property_name(setting)), as_properties(setting.help.trim()));
+    let (name, default) = (property_name(setting), setting.default());
+    let (nick, help) = (format_nick(name), as_properties(setting.help.trim()));
     let choices = (setting.choices)();
     if !choices.is_empty() {
-        let default = setting.default().and_then(|name| choices.iter().position(|choice| choice.0 == name));
+        let place = default.and_then(|default| choices.iter().position(|choice| choice.0 == default));
         let type_name = format!("GstBokeh{}", nick.split(' ').map(capitalise).collect::<String>());
         let type_ = enums::register(&type_name, &choices);
         let flags = glib::ParamFlags::READWRITE | gst::PARAM_FLAG_CONTROLLABLE | gst::PARAM_FLAG_MUTABLE_PLAYING;
-        return enums::param_spec(property_name(setting), (&nick, &blurb), type_, default.unwrap_or(0), flags);
+        return enums::param_spec(name, (&nick, &help), type_, place.unwrap_or(0), flags);
     }
-    let default = setting.default();
     match (setting.range)() {
         Some(range) => {
             let number = default.and_then(|text| text.parse().ok());
             // A number without a default is 0 while unset.
             let (min, blurb) = match number {
-                Some(_) => (*range.start(), blurb),
-                None => (0.0, format!("{blurb}; 0 is not set")),
+                Some(_) => (*range.start(), help),
+                None => (0.0, format!("{help}; 0 is not set")),
             };
-            let number = glib::ParamSpecFloat::builder(property_name(setting)).default_value(number.unwrap_or(0.0));
-            let number = number.nick(&nick).blurb(&blurb).minimum(min).maximum(*range.end());
-            number.controllable().mutable_playing().build()
+            let spec = glib::ParamSpecFloat::builder(name).nick(&nick).blurb(&blurb).minimum(min);
+            let spec = spec.maximum(*range.end()).default_value(number.unwrap_or(0.0));
+            spec.controllable().mutable_playing().build()
         }
         None => {
             let default = default.unwrap_or_else(|| AUTO.to_owned());
-            let text = glib::ParamSpecString::builder(property_name(setting)).nick(&nick).blurb(&blurb);
-            text.default_value(Some(default.as_str())).mutable_playing().build()
+            let spec = glib::ParamSpecString::builder(name).nick(&nick).blurb(&help);
+            spec.default_value(Some(default.as_str())).mutable_playing().build()
         }
     }
 }
@@ -141,7 +142,8 @@ fn setting_spec(setting: &Setting) -> glib::ParamSpec {
 /// Value of unset text settings without a default.
 const AUTO: &str = "auto";
 
-fn nick(name: &str) -> String {
+/// Returns a property's name for people: a capitalised phrase.
+fn format_nick(name: &str) -> String {
     capitalise(&name.replace('-', " "))
 }
 
