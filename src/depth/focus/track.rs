@@ -49,14 +49,14 @@ impl ObjectTrack {
                 let dioptres = 1.0 / median_depth_at(map, self.at[0], self.at[1], window_m)?;
                 let (center, radius) = (self.at, [FIRST_RADIUS; 2]);
                 let at_first = Object { dioptres, time_ns, center, spread: [0.0; 2], fraction: 0.0 };
-                Some(measure_object(map, at_first, (radius, motion_tolerance(0, 0))).unwrap_or(at_first))
+                Some(measure_object(map, at_first, radius, motion_tolerance(0, 0)).unwrap_or(at_first))
             }
             Some(previous) => {
                 let radius = previous.spread.map(|spread| SPREAD_FACTOR * spread + MARGIN);
                 // First finds the mean distance within the motion tolerance, then the object around that distance.
-                let near = measure_object(map, previous, (radius, motion_tolerance(previous.time_ns, time_ns)));
+                let near = measure_object(map, previous, radius, motion_tolerance(previous.time_ns, time_ns));
                 let now = near.and_then(|near| {
-                    measure_object(map, Object { center: previous.center, ..near }, (radius, motion_tolerance(0, 0)))
+                    measure_object(map, Object { center: previous.center, ..near }, radius, motion_tolerance(0, 0))
                 });
                 now.filter(|now| now.fraction >= MIN_SIZE_RATIO * previous.fraction).map(|now| {
                     let fraction = previous.fraction + (now.fraction - previous.fraction) * SMOOTHING;
@@ -76,14 +76,16 @@ impl ObjectTrack {
 }
 
 /// Measures the pixels within `radius` of an object's centre and `tolerance` of its distance; `None` if there are none.
-fn measure_object(map: &DepthMap, object: Object, (radius, tolerance): ([f32; 2], f32)) -> Option<Object> {
+fn measure_object(map: &DepthMap, object: Object, radius: [f32; 2], tolerance: f32) -> Option<Object> {
     let size = [map.width as usize, map.height as usize];
     let steps = size.map(|count| count.div_ceil(MAX_SAMPLES).max(1));
     let range = |k: usize| {
         let at = |fraction: f32| ((fraction.clamp(0.0, 1.0) * size[k] as f32) as usize).min(size[k]);
         (at(object.center[k] - radius[k])..at(object.center[k] + radius[k])).step_by(steps[k])
     };
-    let (mut count, mut dioptres, mut places, mut squares) = (0.0, 0.0, [0.0; 2], [0.0; 2]);
+    let (mut count, mut dioptres) = (0.0, 0.0);
+    // Sums of the positions, as fractions of width and height, and of their squares.
+    let [mut sums, mut squares] = [[0.0; 2]; 2];
     for y in range(1) {
         for x in range(0) {
             let metres = map.metres[y * size[0] + x];
@@ -91,16 +93,16 @@ fn measure_object(map: &DepthMap, object: Object, (radius, tolerance): ([f32; 2]
             if DepthMap::is_known(metres) && (inverse - object.dioptres).abs() <= tolerance {
                 count += 1.0;
                 dioptres += inverse;
-                for (k, at) in [x, y].into_iter().enumerate() {
-                    let place = (at as f32 + 0.5) / size[k] as f32;
-                    places[k] += place;
-                    squares[k] += place * place;
+                for (k, px) in [x, y].into_iter().enumerate() {
+                    let at = (px as f32 + 0.5) / size[k] as f32;
+                    sums[k] += at;
+                    squares[k] += at * at;
                 }
             }
         }
     }
     (count > 0.0).then(|| {
-        let center = places.map(|sum| sum / count);
+        let center = sums.map(|sum| sum / count);
         let spread = [0, 1].map(|k| {
             (squares[k] / count - center[k] * center[k]).max(0.0).sqrt().clamp(SPREAD_RANGE[0], SPREAD_RANGE[1])
         });

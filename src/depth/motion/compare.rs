@@ -93,8 +93,9 @@ impl Pictures<'_> {
         far.extend(near.iter().map(|near| !near));
     }
 
-    /// Returns the mean absolute difference of a cell after a displacement, or of its near or far surface, whose mask
-    /// must be set. Pixels outside the picture are ignored; `None` if these are the majority, or too few are left.
+    /// Returns the mean absolute difference of a cell after a displacement, in codes; with `is_near`, of one surface by
+    /// the masks of [`Self::compute_mask`]. Pixels outside the picture are ignored; `None` if these are the majority,
+    /// or too few are left.
     #[inline(always)]
     pub fn mean_difference(&self, place: (usize, usize), [right, down]: Vector, is_near: Option<bool>) -> Option<f32> {
         let (width, height) = self.grid.size;
@@ -117,17 +118,16 @@ impl Pictures<'_> {
             let from = y * width + xs.start;
             let then = &self.then[3 * from..][..3 * xs.len()];
             let now = &self.now[3 * from.wrapping_add_signed(moved)..][..3 * xs.len()];
-            match mask {
-                None => {
-                    sum += sum_of_differences(then, now);
-                    count += then.len() as u32;
-                }
+            let (difference, compared) = match mask {
+                None => (sum_of_differences(then, now), then.len() as u32),
                 Some(mask) => {
-                    let mask = &mask[3 * (line * columns.len() + xs.start - columns.start)..][..then.len()];
-                    let (difference, marked) = masked_sum_of_differences((then, now), mask);
-                    (sum, count) = (sum + difference, count + marked);
+                    // The mask has the compared rows of the whole cell, one after the other.
+                    let at = line * columns.len() + xs.start - columns.start;
+                    masked_sum_of_differences(then, now, &mask[3 * at..][..then.len()])
                 }
-            }
+            };
+            sum += difference;
+            count += compared;
         }
         (count >= 3 * MIN_PIXELS).then(|| sum as f32 / count as f32)
     }
@@ -156,7 +156,7 @@ fn sum_of_differences(then: &[u8], now: &[u8]) -> u32 {
 
 /// Returns the sum of absolute differences of the masked bytes, and their number.
 #[inline(always)]
-fn masked_sum_of_differences((then, now): (&[u8], &[u8]), mask: &[u8]) -> (u32, u32) {
+fn masked_sum_of_differences(then: &[u8], now: &[u8], mask: &[u8]) -> (u32, u32) {
     let sum = |then: &[u8], now: &[u8], mask: &[u8]| {
         let pairs = then.iter().zip(now).zip(mask);
         let difference: u32 = pairs.map(|((a, b), m)| u32::from((a & m).abs_diff(b & m))).sum();

@@ -8,7 +8,7 @@ use super::noise::{NO_NOISE, NoiseEstimator};
 use super::temporal::{MOVED, MOVED_BOUNDS};
 use crate::frame::{ColorImage, DepthMap};
 
-/// Once decided, two consecutive frames of this many are compared.
+/// Once decided, the first two of this many frames are compared.
 const PERIOD: u32 = 5;
 /// Comparisons in a row that change the decision, and for depth that was ever inexact: five seconds at 30 frames per
 /// second.
@@ -84,15 +84,16 @@ impl ExactnessDetector {
     /// ignored.
     pub fn add_frame(&mut self, map: &DepthMap, color: &ColorImage) {
         let is_decided = self.is_exact || self.was_inexact;
-        let turn = self.frames % PERIOD;
+        let frame_of_period = self.frames % PERIOD;
         self.frames = self.frames.wrapping_add(1);
-        if map.size() != color.size() || map.metres.is_empty() || is_decided && turn > 1 {
-            return self.before.clear();
+        // Once decided, only frames 0 and 1 of a period are sampled, and 1 is compared with 0.
+        if map.size() != color.size() || map.metres.is_empty() || is_decided && frame_of_period > 1 {
+            return self.reset();
         }
         self.sample(map, color);
         if self.size == map.size()
             && self.before.len() == self.now.len()
-            && let Some(unsteady) = unsteady_fraction(&self.now, &self.before, (&mut self.changes, &mut self.sorted))
+            && let Some(unsteady) = unsteady_fraction(&self.now, &self.before, &mut self.changes, &mut self.sorted)
         {
             self.update_decision(map, unsteady);
         }
@@ -126,7 +127,8 @@ impl ExactnessDetector {
         self.against = if speaks_against { self.against + 1 } else { 0 };
         let needed = if self.was_inexact && !self.is_exact { LONG_DECISION_COUNT } else { DECISION_COUNT };
         if self.against >= needed {
-            (self.is_exact, self.against) = (!self.is_exact, 0);
+            self.is_exact = !self.is_exact;
+            self.against = 0;
             self.was_inexact |= !self.is_exact;
         }
     }
@@ -134,11 +136,7 @@ impl ExactnessDetector {
 
 /// Returns the fraction of the pixels with static colours whose depth is not static; `None` if there are too few. Fills
 /// `sorted` with the inverse depths known now.
-fn unsteady_fraction(
-    now: &[Sample],
-    before: &[Sample],
-    (changes, sorted): (&mut Vec<f32>, &mut Vec<f32>),
-) -> Option<f32> {
+fn unsteady_fraction(now: &[Sample], before: &[Sample], changes: &mut Vec<f32>, sorted: &mut Vec<f32>) -> Option<f32> {
     let change = |(now, before): (&Sample, &Sample)| {
         now.rgb.iter().zip(before.rgb).map(|(now, before)| f32::from(now.abs_diff(before))).sum::<f32>()
     };
