@@ -147,15 +147,15 @@ impl Evidence {
             fits[k] = colors.is_there[k] * fast_max(fast_exp(-colors.off_line[k]), MIN_OFF_LINE);
         }
         let mut likelihoods = [[0.0; LANES]; STEPS];
-        let mut any = [[0.0; LANES]; 2];
+        let mut all = [[0.0; LANES]; 2];
         for (step, likelihoods) in likelihoods.iter_mut().enumerate() {
             let tried = step as f32 * STEP;
             for k in 0..LANES {
                 let off = tried - alphas[k];
                 let likely = fits[k] * fast_max(fast_exp(-0.5 * colors.precision[k] * off * off), MIN_LIKELIHOOD);
                 likelihoods[k] = likely;
-                any[0][k] += likely;
-                any[1][k] += likely * tried;
+                all[0][k] += likely;
+                all[1][k] += likely * tried;
             }
         }
         let mut sided = [[0.0; LANES]; 2];
@@ -172,9 +172,9 @@ impl Evidence {
         }
         for n in 0..2 {
             for k in 0..LANES {
-                let any = any[n][k] * (1.0 / STEPS as f32);
-                evidence.any_alpha[n][k] = any;
-                evidence.sided[n][k] = if colors.is_thin[k] > 0.0 { any } else { sided[n][k] };
+                let mean = all[n][k] * (1.0 / STEPS as f32);
+                evidence.any_alpha[n][k] = mean;
+                evidence.sided[n][k] = if colors.is_thin[k] > 0.0 { mean } else { sided[n][k] };
             }
         }
         for k in 0..LANES {
@@ -205,17 +205,17 @@ impl Prior {
     pub fn estimate(evidence: &[Evidence]) -> Self {
         let mut prior = PRIOR;
         for _ in 0..PRIOR_ROUNDS {
-            let [pure, half, any] = prior.mixture_weights();
+            let [pure_weight, sided_weight, any_weight] = prior.mixture_weights();
             let [mut mixed, mut bordering, mut wrong, mut all] = [[0.0f32; LANES]; 4];
             for one in evidence {
                 for k in 0..LANES {
-                    let (half, any) = (half * one.sided[0][k], any * one.any_alpha[0][k]);
-                    let total = pure * one.pure[k] + half + any;
+                    let (sided, any) = (sided_weight * one.sided[0][k], any_weight * one.any_alpha[0][k]);
+                    let total = pure_weight * one.pure[k] + sided + any;
                     let is_valid = f32::from(u8::from(total > f32::MIN_POSITIVE));
                     let scale = is_valid / fast_max(total, f32::MIN_POSITIVE);
                     wrong[k] += any * scale;
                     all[k] += is_valid;
-                    mixed[k] += one.borders[k] * (half * scale);
+                    mixed[k] += one.borders[k] * (sided * scale);
                     bordering[k] += one.borders[k] * is_valid;
                 }
             }
@@ -235,12 +235,12 @@ impl Prior {
     /// Returns the posterior means of alpha, 0 to 1.
     #[inline(always)]
     pub fn posterior_alphas(&self, one: &Evidence) -> Lanes {
-        let [pure, half, any] = self.mixture_weights();
+        let [pure_weight, sided_weight, any_weight] = self.mixture_weights();
         let mut alphas = [0.0; LANES];
         for k in 0..LANES {
-            let pure = pure * one.pure[k];
-            let total = pure + half * one.sided[0][k] + any * one.any_alpha[0][k];
-            let near = pure * one.is_near[k] + half * one.sided[1][k] + any * one.any_alpha[1][k];
+            let pure = pure_weight * one.pure[k];
+            let total = pure + sided_weight * one.sided[0][k] + any_weight * one.any_alpha[0][k];
+            let near = pure * one.is_near[k] + sided_weight * one.sided[1][k] + any_weight * one.any_alpha[1][k];
             alphas[k] = if total > f32::MIN_POSITIVE { near / total } else { one.is_near[k] };
         }
         alphas

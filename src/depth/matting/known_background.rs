@@ -20,7 +20,7 @@ pub struct KnownBackground<'a> {
     pub revision: Revision,
 }
 
-/// Numbers unique in this process for the content of a remembered background: what is forgotten changes the rounds alone.
+/// Numbers unique in this process for the content of a remembered background. Forgetting a part changes only `rounds`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Revision {
     /// Of `rgb` and `inverse`.

@@ -261,11 +261,11 @@ impl Matting {
         let Self { arch, light, at_edge, edges, pixels, clusters, evidence, wide, .. } = self;
         let (arch, size) = (*arch, (map.width as usize, map.height as usize));
         let (metres, rgb, most) = (&map.metres, &color.rgb[..], Matte::max_pixels(size.0, size.1));
-        let (mut compared, mut marked) = (0..0, edges.len());
         wide.steps.clear();
+        let (mut evaluated, mut marked) = (0..0, edges.len());
         let (mut prior, mut steps) = (Prior::default(), 0);
         loop {
-            let found = compared.end..pixels.len();
+            let found = evaluated.end..pixels.len();
             evidence.resize(found.len().div_ceil(LANES), Evidence::default());
             // Evaluate the new pixels, then trace one step further from those with some alpha.
             let each = bands::chunk_len(found.len(), MIN_PIXELS).next_multiple_of(LANES);
@@ -280,18 +280,17 @@ impl Matting {
             if !is_first {
                 wide.steps.push(found.clone());
             }
-            compared = found;
-            if compared.is_empty() || steps == MAX_STEPS {
+            evaluated = found;
+            if evaluated.is_empty() || steps == MAX_STEPS {
                 break;
             }
-            let (compared, workers) = (compared.clone(), &mut *workers);
-            let found_until = compared.end;
+            let (compared, workers) = (evaluated.clone(), &mut *workers);
             let trace =
                 Trace { arch, workers, size, metres, depth_step, rgb, light, at_edge, clusters, compared, pixels };
             marked += arch.dispatch(trace);
             // More traced pixels than hair has: the map is noise.
             if marked > most {
-                pixels.truncate(found_until);
+                pixels.truncate(evaluated.end);
                 break;
             }
             steps += 1;

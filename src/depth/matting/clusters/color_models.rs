@@ -90,11 +90,12 @@ impl Clusters {
     ) {
         let Self { across, down, place, clusters, cells, models, .. } = self;
         let (across, down, models) = (*across, *down, &mut models[from..]);
+        // Per radius: clusters the missing cells around the models without a contrast, and fits these models again.
         for radius in RADII_CELLS {
             if models.iter().all(|model| model.contrast.is_some()) {
                 break;
             }
-            let made = clusters.len();
+            let first_new = clusters.len();
             for ColorModel { edge, .. } in models.iter().filter(|model| model.contrast.is_none()) {
                 let (columns, rows) = cells_around(edge, radius, (across, down));
                 for cell in rows.flat_map(|row| columns.clone().map(move |column| row * across + column)) {
@@ -105,9 +106,9 @@ impl Clusters {
                 }
             }
             clusters.resize(cells.len(), Default::default());
-            let new = &cells[made..];
-            let each = bands::chunk_len(new.len(), MIN_CELLS);
-            workers.run_each(new.chunks(each).zip(clusters[made..].chunks_mut(each)), &|(cells, clusters)| {
+            let (new_cells, new_clusters) = (&cells[first_new..], &mut clusters[first_new..]);
+            let each = bands::chunk_len(new_cells.len(), MIN_CELLS);
+            workers.run_each(new_cells.chunks(each).zip(new_clusters.chunks_mut(each)), &|(cells, clusters)| {
                 arch.dispatch(ClusterCells { view, across, cells, clusters });
             });
             let surroundings = Surroundings { across, down, place, clusters };

@@ -70,8 +70,7 @@ impl Buffers {
         device.check_picture_size(size, (COLORS * max_entries) as u64, "matted")?;
         if device.device.limits().max_storage_buffers_per_shader_stage < MAX_BUFFERS {
             return Err(GpuError::Failed(format!(
-                "{}: its limit of buffers per shader is too low for \
-                                                 mattes",
+                "{}: its limit of buffers per shader is too low for mattes",
                 device.name
             )));
         }
@@ -79,6 +78,7 @@ impl Buffers {
         let storage = |label, bytes: usize| buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST);
         let uniform = |label, bytes: usize| buffer(label, bytes, Usage::UNIFORM | Usage::COPY_DST);
         let record = size_of::<MixedPixel>();
+        // Sizes in bytes: 4 a number, 16 a vector (vec4), 12 vectors for the three clusters of a cell.
         let buffers = device.with_error_scope(|| Self {
             frame: uniform("matted frame", size_of::<Frame>()),
             runs: uniform("turns", RUNS * UNIFORM_STRIDE as usize),
