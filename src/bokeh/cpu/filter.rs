@@ -206,7 +206,9 @@ fn filter_column_planes<S: Simd, const R: usize, const P: usize>(
         let weight = |j: usize| simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j as isize * taps.step) + r]);
         for p in 0..P {
             let value = |y: usize| load::<S>(rows, (y & ring_mask) * row_len + (r * 4 + p) * STRIP + x);
-            // Row `y + i` is at index `i % N`, on both sides.
+            // At tap j, output row `y + k` needs the rows `y + k - j` and `y + k + j`. One tap further out, one row on
+            // each side is new: it overwrites the one that is no longer needed. So that no register is moved, row
+            // `y + i` stays at index `i` modulo `N`, and rotated indices, which are constant once unrolled, find it.
             let mut above = [value(y), value(y + 1), value(y + 2), value(y + 3)];
             let mut below = above;
             let mut sums = above;
@@ -221,6 +223,7 @@ fn filter_column_planes<S: Simd, const R: usize, const P: usize>(
                     below[i] = value(y + N - 1 + j);
                     let weight = weight(j);
                     for k in 0..N {
+                        // Rows `y + k - j` and `y + k + j`, because `j` is `i + 1` modulo `N`.
                         let both = simd.add_f32s(above[(k + N - 1 - i) % N], below[(k + 1 + i) % N]);
                         sums[k] = fma(simd, weight, both, sums[k]);
                     }

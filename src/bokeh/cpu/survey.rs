@@ -39,14 +39,14 @@ impl WithSimd for SurveyRow<'_> {
         let [red, green, blue, radii] = means;
         average_squares(sums, rows.len(), [red, green, blue]);
         if !follows_depth {
-            // The same everywhere in every frame, and blurred.
+            // Without depth, the CoC is that of every frame; this large one marks all tiles as blurred.
             return radii.fill(f32::from(u8::MAX));
         }
         radii.fill(0.0);
         for offset in COC_ROWS {
             compute_coc_row(source, (rows.start + offset).min(height - 1), 0, coc);
-            for (mean, coc) in radii.iter_mut().zip(coc.chunks(TILE)) {
-                *mean += coc.iter().sum::<f32>() * (1.0 / (COC_ROWS.len() * coc.len()) as f32);
+            for (mean, part) in radii.iter_mut().zip(coc.chunks(TILE)) {
+                *mean += part.iter().sum::<f32>() * (1.0 / (COC_ROWS.len() * part.len()) as f32);
             }
         }
     }
