@@ -108,13 +108,7 @@ impl Pictures {
             Some((made_for, encoder)) if *made_for == layout => encoder,
             other => {
                 &mut other
-                    .insert((
-                        layout,
-                        Encoder::new(&layout).ok_or(
-                            "pictures cannot be converted back to this \
-                                                                             format",
-                        )?,
-                    ))
+                    .insert((layout, Encoder::new(&layout).ok_or("pictures cannot be converted back to this format")?))
                     .1
             }
         };

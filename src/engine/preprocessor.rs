@@ -186,8 +186,7 @@ impl Preprocessor {
             Some(Verdict::Misaligned(misalignment, correction)) => {
                 if self.coc.set_correction(correction) {
                     let line = format!(
-                        "depth is aligned with the pictures, as {misalignment}; --refine off uses it \
-                                        unchanged"
+                        "depth is aligned with the pictures, as {misalignment}; --refine off uses it unchanged"
                     );
                     self.warning = Some(line);
                 } else if self.input.depth == Origin::Single {

@@ -29,15 +29,8 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 /// The only writer to stderr, shared by all threads.
 pub fn screen() -> &'static Screen {
     static SCREEN: OnceLock<Screen> = OnceLock::new();
-    let lost = |lines: u64| {
-        encode(
-            "WARN",
-            &format!(
-                "{lines} lines are missing: the terminal accepted none for too \
-                                                     long"
-            ),
-        )
-    };
+    let lost =
+        |lines: u64| encode("WARN", &format!("{lines} lines are missing: the terminal accepted none for too long"));
     SCREEN.get_or_init(|| Screen::new(io::stderr(), lost))
 }
 

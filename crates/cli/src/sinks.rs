@@ -53,8 +53,7 @@ pub fn check_targets(targets: &[Target], parts: &Streaming, source: &SourceName)
         };
         if let Some(folder) = targets.iter().find(|other| *other != target && lies_in(other)) {
             return usage(format!(
-                "--to {target}: that folder is for the pictures of --to {folder}; choose another \
-                                  place"
+                "--to {target}: that folder is for the pictures of --to {folder}; choose another place"
             ));
         }
         if devices.iter().any(|device| target.is_device(device)) {

@@ -24,8 +24,7 @@ impl SelfTest {
         let (Self { wrong, all, one_in, results }, name) = (self, &device.name);
         (wrong * one_in > *all).then(|| {
             GpuError::Failed(format!(
-                "{name}: self-test failed: {wrong} of {all} {results} are wrong; its driver may \
-                                      be faulty"
+                "{name}: self-test failed: {wrong} of {all} {results} are wrong; its driver may be faulty"
             ))
         })
     }

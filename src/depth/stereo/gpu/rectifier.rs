@@ -82,8 +82,7 @@ impl GpuRectifier {
             Ok(())
         } else {
             Err(GpuError::Failed(format!(
-                "{name}: self-test failed: a picture is rectified wrongly; its driver may be \
-                                          faulty"
+                "{name}: self-test failed: a picture is rectified wrongly; its driver may be faulty"
             )))
         }
     }

@@ -92,11 +92,9 @@ impl Provider {
             provider.handle_disconnect();
             match ended {
                 Ok(()) if stop.load(Ordering::Acquire) => return,
-                Ok(()) => tracing::warn!(
-                    "PipeWire has stopped; the camera {} waits for its \
-                                          return",
-                    provider.settings.name
-                ),
+                Ok(()) => {
+                    tracing::warn!("PipeWire has stopped; the camera {} waits for its return", provider.settings.name)
+                }
                 Err(error) => match ready.take() {
                     Some(ready) => return drop(ready.send(Err(error))),
                     None => tracing::debug!("{error}"),
