@@ -103,23 +103,23 @@ impl Recording {
                 // Maps of photos are turned as photos are.
                 let tag = self.are_photos.then(|| coded::read_orientation(&path).ok()).flatten();
                 let turn = upright(tag.unwrap_or(Orientation::NoTransforms));
-                let size = turn.rotated_size(size);
+                let stored_size = turn.rotated_size(size);
                 let read = match form {
                     DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
-                        decode::read_depth(&path, *units, Some(size), scratch, into)
+                        decode::read_depth(&path, *units, Some(stored_size), scratch, into)
                     }
                     DepthFormat::Inverse { white_is_far } => {
-                        decode::read_inverse_depth(&path, *white_is_far, size, scratch, into)
+                        decode::read_inverse_depth(&path, *white_is_far, stored_size, scratch, into)
                     }
-                    DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, size, scratch, into),
+                    DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, stored_size, scratch, into),
                 };
                 if !turn.is_identity() {
-                    *into = turn.transform_map(mem::take(into), size);
+                    *into = turn.transform_map(mem::take(into), stored_size);
                 }
                 read
             }
         };
-        let read = match (read, &self.depth_registration) {
+        let checked = match (read, &self.depth_registration) {
             (Ok(()), Some(_)) if into.size() != size => {
                 Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size })
             }
@@ -128,6 +128,6 @@ impl Recording {
             }
             (read, _) => read,
         };
-        read.map_err(|fault| source.error(&self.folder.dir, fault))
+        checked.map_err(|fault| source.error(&self.folder.dir, fault))
     }
 }

@@ -72,16 +72,16 @@ impl Exif {
         Some(read.without_positions())
     }
 
-    /// Reads the EXIF of a TIFF file.
+    /// Reads the EXIF of a TIFF file: of its first picture's directory, and of the directories that this points to.
     fn read(decoder: &mut Decoder<impl Read + Seek>) -> TiffResult<Self> {
-        let (mut read, mut room) = (Self::new(), MAX_BYTES);
+        let (mut exif, mut room) = (Self::new(), MAX_BYTES);
         for tag in DESCRIPTIVE.map(Tag::from_u16_exhaustive) {
             let mut value = ValueBuffer::empty(Type::BYTE);
             if decoder.image_ifd().find_tag_buf(tag, &mut value).is_ok_and(|found| found.is_some()) {
-                read.descriptive.extend(take_room(&mut room, to_entry(tag, value)));
+                exif.descriptive.extend(take_room(&mut room, to_entry(tag, value)));
             }
         }
-        for (pointer, entries) in &mut read.directories {
+        for (pointer, entries) in &mut exif.directories {
             let Some(at) = decoder.find_tag_unsigned::<u64>(*pointer)? else { continue };
             let directory = decoder.read_directory(IfdPointer(at))?;
             for (tag, _) in directory.iter() {
@@ -91,10 +91,11 @@ impl Exif {
                 entries.push(entry);
             }
         }
-        Ok(read.without_positions())
+        Ok(exif.without_positions())
     }
 
-    /// Leaves out the entries that describe the file instead of the photo.
+    /// Leaves out the entries that describe the file instead of the photo: above all positions, which a copy would not
+    /// preserve.
     fn without_positions(mut self) -> Self {
         self.descriptive.retain(|entry| DESCRIPTIVE.contains(&entry.0.to_u16()));
         self.directories

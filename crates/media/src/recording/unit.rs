@@ -46,11 +46,11 @@ impl MapUnit {
         let mut words = text.split_ascii_whitespace();
         let kind = words.next()?;
         let value = |name: &str| {
-            let mut words = words.clone();
-            let value: f32 = words.find_map(|word| word.strip_prefix(name)?.strip_prefix('=')?.parse().ok())?;
-            value.is_finite().then_some(value)
+            let mut rest = words.clone();
+            let number: f32 = rest.find_map(|word| word.strip_prefix(name)?.strip_prefix('=')?.parse().ok())?;
+            number.is_finite().then_some(number)
         };
-        let above_zero = |name: &str| value(name).filter(|&value| value > 0.0);
+        let above_zero = |name: &str| value(name).filter(|&number| number > 0.0);
         match kind {
             "depth" => Some(Self::Depth { per_m: above_zero("units_per_metre")? }),
             "disparity" if value("units_per_pixel") == Some(DISPARITY_SCALE) => {

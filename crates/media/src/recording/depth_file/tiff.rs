@@ -37,7 +37,8 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
     let mut decoder = decoder.with_limits(limits);
     let tag = decoder.find_tag_unsigned::<u8>(Tag::Orientation).ok().flatten();
     let orientation = tag.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
-    let numbers = |samples, white, stored: Vec<f32>| {
+    // Takes the first of several channels, which must be nearly equal (grey).
+    let to_values = |samples, white, stored: Vec<f32>| {
         let channels = (stored.len() / pixels).max(1);
         let mut colors = ColorCount::new(white);
         let numbers: Vec<f32> = match channels {
@@ -58,10 +59,10 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
         colors.check(pixels)?;
         Ok(Values { size: (width, height), numbers, samples, ..Values::default() }.turned(orientation))
     };
-    let floats = |stored| numbers(Samples::Float, 1.0, stored);
-    let whole = |stored| numbers(Samples::Whole, 65535.0, stored);
+    let floats = |stored| to_values(Samples::Float, 1.0, stored);
+    let whole = |stored| to_values(Samples::Whole, 65535.0, stored);
     match decoder.read_image().map_err(fault)? {
-        DecodingResult::U8(codes) => numbers(Samples::Eight, 255.0, codes.into_iter().map(f32::from).collect()),
+        DecodingResult::U8(codes) => to_values(Samples::Eight, 255.0, codes.into_iter().map(f32::from).collect()),
         DecodingResult::U16(codes) => whole(codes.into_iter().map(f32::from).collect()),
         DecodingResult::U32(codes) => whole(codes.into_iter().map(|code| code as f32).collect()),
         DecodingResult::I16(codes) => whole(codes.into_iter().map(f32::from).collect()),
