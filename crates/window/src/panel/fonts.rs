@@ -42,7 +42,7 @@ impl SystemFonts {
     pub(super) fn with_config(config: Option<PathBuf>, found: impl Fn() + Send + 'static) -> Self {
         let (missing, requests) = mpsc::channel();
         let fonts = Arc::new(FontCache { fonts: Mutex::default(), missing: Mutex::new(missing) });
-        let shared = Arc::downgrade(&fonts);
+        let weak_cache = Arc::downgrade(&fonts);
         let search = move || {
             while let Ok(first) = requests.recv() {
                 let mut signs = vec![first];
@@ -50,10 +50,9 @@ impl SystemFonts {
                     signs.push(next);
                 }
                 let fonts = find_fonts(signs, config.as_ref());
-                let Some(shared) = shared.upgrade().filter(|_| !fonts.is_empty()) else { continue };
-                let mut all = shared.fonts.lock().unwrap_or_else(PoisonError::into_inner);
-                all.extend(fonts.into_iter().map(|(sign, font)| (sign, Some(font))));
-                drop(all);
+                let Some(cache) = weak_cache.upgrade().filter(|_| !fonts.is_empty()) else { continue };
+                let found_fonts = fonts.into_iter().map(|(sign, font)| (sign, Some(font)));
+                cache.fonts.lock().unwrap_or_else(PoisonError::into_inner).extend(found_fonts);
                 found();
             }
         };
