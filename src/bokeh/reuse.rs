@@ -96,9 +96,9 @@ pub struct ChangeDetector {
     results: Units,
     /// What the results depend on besides the surveyed frame; `None` before the first.
     generation: Option<u64>,
-    /// Frames since everything was made anew, for the rows whose turn it is.
+    /// Frames since everything was recomputed, for the rows whose turn it is.
     frame: usize,
-    /// Frames until the next test, and those after the next one in which everything changes.
+    /// Frames left until the next test, and the back-off: the number to skip if that test finds everything changed.
     untested: [u32; 2],
 }
 

@@ -75,7 +75,7 @@ impl Composer {
         self.backdrop.as_ref().is_some_and(|backdrop| *backdrop.background() == Background::Transparent)
     }
 
-    /// Draws what is kept of a frame of `size`, before it is composed.
+    /// Draws the foreground mask of a frame of `size`, before it is composed; blurring it gives alpha.
     pub fn draw_kept(&mut self, size: (u32, u32), map: &DepthMap, field: &CocField, kept: &mut Images) {
         if let (CocField::Depth(lens), Some(backdrop)) = (field, &mut self.backdrop) {
             backdrop.draw_kept((size, map), lens, &mut kept.color, kept.depth.get_or_insert_default());

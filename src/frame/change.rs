@@ -18,9 +18,9 @@ const DEVIATIONS: f32 = 5.0;
 /// Fraction of a normal distribution's absolute values below [`QUARTILE`] standard deviations.
 const QUARTER: usize = 4;
 const QUARTILE: f32 = 0.3186;
-/// Differences, in the same units, of the held content from that of which a result was made that count, and the fraction
-/// of the bound of the CoC. Most of the content stays, so it has less noise; and while content that differs from its
-/// neighbours is blurred, results that do would show a seam.
+/// Thresholds on the difference, in codes of Y'CbCr, between the held content and the content that a kept result was
+/// computed from; and on that of the CoC, as a fraction of its own threshold. They are lower, because held content has
+/// less noise, and because a difference between neighbouring results would show as a seam, which blur hides in content.
 const RESULT_BOUND: [f32; 2] = [0.4, 0.7];
 const RESULT_COC_BOUND: f32 = 0.6;
 /// Change of the CoC that counts, as a fraction of the smallest kept radius, and at least in pixels.
@@ -203,7 +203,7 @@ impl Prediction {
         predict_result(&self.content, self.weights, &mut self.scratch, &mut self.held);
     }
 
-    /// Marks the units of some rows of tiles where the held content differs from that of which the result was made.
+    /// Marks the units of some rows of tiles where the held content differs from the one the result was computed from.
     pub fn find_outdated(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
         let [luma, chroma] = RESULT_BOUND;
         let bounds = [luma, chroma, chroma, RESULT_COC_BOUND * self.bounds[3]];

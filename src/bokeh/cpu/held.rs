@@ -17,7 +17,7 @@ use crate::compute::thread_pool::DisjointParts;
 use crate::frame::change::TILE;
 use crate::optics::CocField;
 
-/// Rows and columns of the smallest picture of which anything is kept, in pixels.
+/// Minimum width and height, in pixels, of pictures whose results are kept.
 const MIN_SIDE: usize = 64;
 
 /// The last result, and what changed since.
@@ -65,7 +65,7 @@ impl Held {
             return None;
         }
         let (width, height) = (plan.width, plan.height);
-        // Of small pictures, the borders are most, where few pixels stand for all beyond.
+        // In small pictures border effects dominate: a few pixels stand for everything beyond them.
         if width.min(height) < MIN_SIDE {
             return None;
         }

@@ -13,8 +13,8 @@ use crate::optics::DepthCoc;
 const KEPT_CODE: u8 = 188;
 
 impl VirtualBackground {
-    /// Makes the picture of what [`VirtualBackground::replace_background`] keeps of a frame of `size` with this `map`,
-    /// before it does: grey where it is kept, black where it is replaced. `kept` and `kept_map` are to be blurred.
+    /// Draws the foreground mask of a frame of `size` with this `map`: grey where [`Self::replace_background`] keeps
+    /// it, else black. Blurring `kept` by `kept_map` gives alpha.
     pub fn draw_kept(
         &mut self,
         (size, map): ((u32, u32), &DepthMap),

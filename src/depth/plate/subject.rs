@@ -31,7 +31,7 @@ const MIN_COMPONENT: f32 = 0.002;
 const MAX_HOLE: f32 = 0.001;
 
 /// Minimum mask value of a person; radius around persons that belongs to them, as a fraction of the mask's width; and
-/// maximum size of what else is connected to them, such as held objects, relative to them.
+/// maximum size of objects attached to them, such as held ones, relative to them.
 const MIN_PERSON_ALPHA: f32 = 0.5;
 const CLOSE_FRACTION: f32 = 0.02;
 const MAX_HELD: f32 = 0.3;

@@ -23,7 +23,7 @@ const MAX_ROW_OFFSET_PX: f32 = 0.75;
 const MAX_ROW_SPREAD_PX: f32 = 1.0;
 /// Disparities of distant points are around 0; those below this count as negative.
 const NEGATIVE_PX: f32 = -1.0;
-/// The largest disparity is one that at least this many points, and this fraction of all, have or exceed.
+/// Minimum support of the largest disparity: number and fraction of the points that have or exceed it.
 const MIN_DISPARITY_POINTS: usize = 4;
 const MIN_DISPARITY_FRACTION: f32 = 0.015;
 /// With a larger fraction of negative disparities, left and right are swapped.

@@ -68,8 +68,7 @@ fn list_formats() -> String {
     FORMATS.iter().map(describe).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns what the file has of the format that it is most similar to, and what it lacks; `None` if it has less than a
-/// third of the entries of each.
+/// Describes the best-matching format, with its present and missing entries; `None` below a third of the entries.
 fn find_similar(path: &Path) -> Option<String> {
     let text = input::read(path, input::MAX_CALIBRATION_BYTES).ok()?;
     let text = String::from_utf8_lossy(&text);
@@ -79,7 +78,7 @@ fn find_similar(path: &Path) -> Option<String> {
     let groups = FORMATS.iter().flat_map(|format| format.keys.iter().map(move |keys| (format.name, *keys)));
     let rated =
         groups.map(|(name, keys)| (keys.iter().filter(is_found).count() as f64 / keys.len() as f64, name, keys));
-    let (_, name, keys) = rated.filter(|(share, ..)| *share >= 1.0 / 3.0).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (_, name, keys) = rated.filter(|(fraction, ..)| *fraction >= 1.0 / 3.0).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let (found, lacking): (Vec<&str>, Vec<&str>) = keys.iter().partition(|key| words.contains(**key));
     Some(match lacking.as_slice() {
         [] => format!("; it has {} of {name}, but in other places", found.join(" ")),

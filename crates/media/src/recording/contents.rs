@@ -103,7 +103,7 @@ pub(super) trait Container: Debug + Send + Sync {
 /// Warns that a recording's file has faults.
 pub(super) fn warn_of_damage(name: &str, damage: Option<&str>) {
     if let Some(damage) = damage {
-        tracing::warn!("{name}: damaged: {damage}; what is whole is played");
+        tracing::warn!("{name}: damaged: {damage}; the intact part is played");
     }
 }
 

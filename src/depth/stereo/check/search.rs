@@ -21,7 +21,7 @@ const CORNER_RADIUS: usize = 2;
 const MIN_CORNER_STRENGTH: f32 = 16.0;
 /// Minimum correlation of a match.
 const MIN_SCORE: f32 = 0.8;
-/// A match is unique if its distance to correlation 1 is at most this fraction of that of the second best place.
+/// Ratio test (Lowe 2004): one minus the correlation of a unique match is at most this fraction of the second best's.
 const UNIQUENESS_RATIO: f32 = 0.6;
 /// Places this near to the best one belong to its peak, in pixels at half resolution.
 const PEAK_RADIUS: i32 = 3;

@@ -27,8 +27,8 @@ const MAX_LINE_BYTES: usize = 1024;
 /// Frames per second of a stream that does not state them.
 const DEFAULT_FPS: f64 = 30.0;
 
-/// How long a late frame may be on its way and still be skipped: one that a live program writes only now is the newest,
-/// and is shown.
+/// A late frame is skipped only if it arrives within this time. A later one was written just now by a live program, so
+/// that it is the newest.
 const SKIP_PATIENCE: Duration = Duration::from_millis(5);
 
 /// Reads the pictures of a stream in order.

@@ -25,13 +25,13 @@ enum Quantity {
 
 /// No scene that a camera sees is deeper, but for its sky.
 const MAX_PLAUSIBLE_M: f32 = 1000.0;
-/// Share of the pixels beyond that which counts as noise.
+/// Fraction of the pixels farther away that still counts as noise.
 const MAX_IMPLAUSIBLE: f32 = 0.005;
-/// Share of 256 equal ranges of 16 bits in which a map that was stretched to all of them has values.
+/// Minimum occupied bins, of a histogram with 256, of a 16-bit map that was stretched to the full range.
 const STRETCHED: usize = 256 * 3 / 10;
 /// Number of different values of 8 bits from which on a map is no sketch of a few surfaces.
 const MIN_STEPS: usize = 16;
-/// Share of unknown depth that is reported.
+/// Fraction of unknown depth above which it is reported.
 const MAX_UNKNOWN: f32 = 0.05;
 
 impl Meaning {

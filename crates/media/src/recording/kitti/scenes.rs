@@ -38,8 +38,8 @@ fn calibration_of(picture: &str) -> String {
     format!("{}.txt", picture.split(['_', '.']).next().unwrap_or_default())
 }
 
-/// Chooses the scenes of [`Options::size`] or else of the first one's size, and of those the ones with the calibration
-/// of the first. `left` is the folder of the left pictures, and `camera` the number of the left camera.
+/// Selects scenes by [`Options::size`], or else the first scene's size, then by the first selected one's calibration.
+/// `left` is the folder of the left pictures, and `camera` the number of the left camera.
 ///
 /// # Errors
 /// A calibration is faulty, or missing although other scenes have one; with `keep_going` its scene is left out.
