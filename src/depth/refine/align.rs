@@ -91,7 +91,7 @@ impl Aligner {
             if round == 0 {
                 self.find_all_edges((arch, workers), inverse, width, depth_step, bands);
             }
-            let Self { planes, edge, band, scratch, tiles, spatial_weights, worklist, results, pixels, moved } = self;
+            let Self { planes, edge, band, scratch, tiles, worklist, moved, .. } = self;
             if round > 0 {
                 // Only pixels that moved in the last round can have moved edges, or can move their neighbours now.
                 workers.run_each(bands.rows().zip(bands.split(edge, width)), &|(rows, edge)| {
@@ -123,14 +123,9 @@ impl Aligner {
                 worklist.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
             moved.clear();
-            move_edges(
-                (arch, workers),
-                (planes, spatial_weights, depth_step),
-                (inverse, band),
-                (worklist, results, moved),
-            );
+            self.move_edges((arch, workers), inverse, depth_step);
             if round == 0 {
-                std::mem::swap(worklist, pixels);
+                std::mem::swap(&mut self.worklist, &mut self.pixels);
             }
         }
         snap_to_surfaces(&self.pixels, inverse, rgb, width, depth_step);
@@ -160,47 +155,47 @@ impl Aligner {
         tiles.collect_edges(edge, worklist);
         planes.resize(width, height, RADIUS_LANES);
     }
-}
 
-/// Finds the surface of the pixels at edges, the `worklist`, and of the neighbours of those that change: an edge moves
-/// like a wavefront, and costs little where it is correct. A result depends only on the pixel's own depth and on the
-/// planes, so that the whole worklist is computed in parallel. `band` marks the pixels that may change; a pixel leaves it
-/// when it joins the worklist, so that it is processed once.
-fn move_edges(
-    (arch, workers): (Arch, &mut ThreadPool),
-    (planes, spatial_weights, depth_step): (&Planes, &Weights, f32),
-    (inverse, band): (&mut [f32], &mut [bool]),
-    (worklist, results, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
-) {
-    let width = planes.width;
-    for &k in &*worklist {
-        band[k as usize] = false;
-    }
-    let mut next = 0;
-    while next < worklist.len() {
-        let pixels = &worklist[next..];
-        let each = bands::chunk_len(pixels.len(), MIN_PIXELS_PER_THREAD);
-        results.resize(pixels.len(), 0.0);
-        workers.run_each(pixels.chunks(each).zip(results.chunks_mut(each)), &|(pixels, results)| {
-            arch.dispatch(FindSurfaces { planes, spatial_weights, inverse, depth_step, pixels, results });
-        });
-        for &result in &*results {
-            let pixel = worklist[next];
-            next += 1;
-            let k = pixel as usize;
-            if result == inverse[k] {
-                continue;
-            }
-            inverse[k] = result;
-            moved.push(pixel);
-            let (x, y) = (k % width, k / width);
-            let beside =
-                [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
-            // For the last row, `k + width` lies beyond the mask.
-            for (inside, beside) in beside {
-                if inside && beside < band.len() && band[beside] {
-                    band[beside] = false;
-                    worklist.push(beside as u32);
+    /// Finds the surface of the pixels at edges, the `worklist`, and of the neighbours of those that change: an edge
+    /// moves like a wavefront, and costs little where it is correct. A result depends only on the pixel's own depth and
+    /// on the planes, so that the whole worklist is computed in parallel. `band` marks the pixels that may change; a
+    /// pixel leaves it when it joins the worklist, so that it is processed once.
+    fn move_edges(&mut self, (arch, workers): (Arch, &mut ThreadPool), inverse: &mut [f32], depth_step: f32) {
+        let Self { planes, spatial_weights, band, worklist, results, moved, .. } = self;
+        let (planes, width) = (&*planes, planes.width);
+        for &k in &*worklist {
+            band[k as usize] = false;
+        }
+        let mut next = 0;
+        while next < worklist.len() {
+            let pixels = &worklist[next..];
+            let each = bands::chunk_len(pixels.len(), MIN_PIXELS_PER_THREAD);
+            results.resize(pixels.len(), 0.0);
+            workers.run_each(pixels.chunks(each).zip(results.chunks_mut(each)), &|(pixels, results)| {
+                arch.dispatch(FindSurfaces { planes, spatial_weights, inverse, depth_step, pixels, results });
+            });
+            for &result in &*results {
+                let pixel = worklist[next];
+                next += 1;
+                let k = pixel as usize;
+                if result == inverse[k] {
+                    continue;
+                }
+                inverse[k] = result;
+                moved.push(pixel);
+                let (x, y) = (k % width, k / width);
+                let beside = [
+                    (x > 0, k.wrapping_sub(1)),
+                    (x + 1 < width, k + 1),
+                    (y > 0, k.wrapping_sub(width)),
+                    (true, k + width),
+                ];
+                // For the last row, `k + width` lies beyond the mask.
+                for (inside, beside) in beside {
+                    if inside && beside < band.len() && band[beside] {
+                        band[beside] = false;
+                        worklist.push(beside as u32);
+                    }
                 }
             }
         }
