@@ -199,18 +199,10 @@ impl Matting {
         let most = Matte::max_pixels(map.width as usize, map.height as usize);
         let least_step = depth_step;
         let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
-        let is_noise_logged = &mut self.is_noise_logged;
-        let mut log_noise = |depth_step: f32| {
-            if depth_step > least_step && !std::mem::replace(is_noise_logged, true) {
-                tracing::info!(
-                    "the depth has jumps nearly everywhere: outlines are separated only where it jumps most"
-                );
-            }
-        };
         if self.gpu.try_run("finds mattes", |gpu| {
             for depth_step in depth_steps() {
                 if gpu.find_mixed_pixels((map, color), device_frame.clone(), depth_step, background)? <= most {
-                    log_noise(depth_step);
+                    log_noise(depth_step > least_step, &mut self.is_noise_logged);
                     break;
                 }
             }
@@ -228,7 +220,7 @@ impl Matting {
         };
         // Only noise has more edges than `most`: then the largest steps are what counts.
         let Some(depth_step) = depth_steps().find(fits) else { return };
-        log_noise(depth_step);
+        log_noise(depth_step > least_step, &mut self.is_noise_logged);
         clusters.clear(size);
         pixels.clear();
         pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
@@ -295,6 +287,13 @@ impl Matting {
             }
             steps += 1;
         }
+    }
+}
+
+/// Logs once that a map is noise.
+fn log_noise(is_noise: bool, is_logged: &mut bool) {
+    if is_noise && !std::mem::replace(is_logged, true) {
+        tracing::info!("the depth has jumps nearly everywhere: outlines are separated only where it jumps most");
     }
 }
 
