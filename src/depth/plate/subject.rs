@@ -114,7 +114,7 @@ impl Subject {
         let deviation = self.estimate_noise(now, plate, alignment);
         let weak = WEAK.max(WEAK_DEVIATIONS * deviation);
         let strong = STRONG.max(STRONG_DEVIATIONS * deviation);
-        self.label_pixels(now, plate, size, (alignment.gain, weak, strong));
+        self.label_pixels(now, plate, size, alignment.gain, weak, strong);
         self.grow_relit_background(size);
         self.find_components(size);
         self.fill_holes(size);
@@ -135,12 +135,16 @@ impl Subject {
         }
     }
 
+    /// Labels each pixel by its largest difference from the plate with the exposure `gain`. `weak` and `strong` are the
+    /// thresholds; what was foreground in the previous frame stays it down to a fraction of them.
     fn label_pixels(
         &mut self,
         now: &[[f32; 3]],
         plate: &[[f32; 3]],
         (width, height): (usize, usize),
-        (gain, weak, strong): ([f32; 3], f32, f32),
+        gain: [f32; 3],
+        weak: f32,
+        strong: f32,
     ) {
         self.labels.clear();
         self.ratios.clear();
@@ -152,18 +156,18 @@ impl Subject {
         self.off.resize(line, 0.0);
         for y in 0..height {
             let row = |y: usize| &plate[y * line..][..line];
-            let (own, values) = (row(y), &now[y * line..][..line]);
+            let (plate_row, now_row) = (row(y), &now[y * line..][..line]);
             let beside = [row(y.saturating_sub(1)), row((y + 1).min(height - 1))];
-            compute_differences(values, own, beside, &self.line, &mut self.off);
+            compute_differences(now_row, plate_row, beside, &self.line, &mut self.off);
             for x in 0..width {
                 let (at, of) = (y * width + x, 3 * x..3 * x + 3);
-                let (values, off) = (&values[of.clone()], &self.off[of.clone()]);
-                let exposed: [f32; 3] = std::array::from_fn(|p| gain[p] * own[3 * x + p]);
+                let (values, off) = (&now_row[of.clone()], &self.off[of.clone()]);
+                let exposed: [f32; 3] = std::array::from_fn(|p| gain[p] * plate_row[3 * x + p]);
                 let ratio = (values.iter().sum::<f32>() + 1.0) / (exposed.iter().sum::<f32>() + 1.0);
                 self.ratios.push(ratio);
                 let most = off[0].max(off[1]).max(off[2]).max(0.0);
                 let stays = if self.foreground[at] { HYSTERESIS } else { 1.0 };
-                // {|| A shadow darkens all channels alike, and a lamp brightens them by similar factors.
+                // A shadow darkens all channels alike, and a lamp brightens them by similar factors.
                 let in_shadow = || {
                     let off = values.iter().zip(exposed).map(|(value, exposed)| (value - ratio * exposed).abs());
                     (MIN_SHADOW_RATIO..1.0).contains(&ratio) && off.fold(0.0, f32::max) < MAX_SHADOW_TINT
