@@ -187,6 +187,7 @@ impl Planner {
         self.choose_plan();
     }
 
+    /// Chooses the finest plan whose frames are predicted to keep up with the camera, and to be shown in time.
     fn choose_plan(&mut self) {
         let Self {
             governor,

@@ -139,6 +139,7 @@ struct Axis {
 }
 
 impl Axis {
+    /// Computes the tent filter that scales `part` of `from` pixels to `to` pixels, unless it is there already.
     fn adapt(&mut self, from: usize, part: (f64, f64), to: usize) {
         if (self.from, self.part, self.firsts.len()) == (from, part, to) {
             return;

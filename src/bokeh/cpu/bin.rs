@@ -124,7 +124,8 @@ impl BinRows<'_> {
         self.rows.div_ceil(CELL)
     }
 
-    /// Adds row `y` of the picture (may be outside it) to the bin rows of a band that begins at row `first`.
+    /// Adds row `y` of the picture (may be outside it) to the bin rows of a band that begins at row `first`. `range` is
+    /// that of the CoC in the row, in pixels.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn add_row<V: Simd, const S: usize>(
@@ -159,6 +160,7 @@ impl BinRows<'_> {
         if from < 0 || upper >= rows {
             return;
         }
+        // Both bin rows in progress alternate between the buffers.
         let parity = upper.rem_euclid(2) as usize;
         let [even, odd] = &mut sums.rows.0;
         let (above, below) = if parity == 0 { (even, odd) } else { (odd, even) };

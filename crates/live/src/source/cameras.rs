@@ -176,6 +176,7 @@ pub fn list_modes(camera: &str) -> Vec<Mode> {
     })
 }
 
+/// Joins the modes of all formats: the largest size first, each with its rates, the fastest first.
 fn merge_formats(formats: &[modes::FormatModes]) -> Vec<Mode> {
     let mut joined: Vec<Mode> = Vec::new();
     let mut add = |size: (u32, u32), rates: &Rates| {

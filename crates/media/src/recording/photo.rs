@@ -46,6 +46,7 @@ impl Photo {
         Ok(photo)
     }
 
+    /// Decodes a photo as it is stored; `codes` only with 16 bits, or other tone curves than sRGB's.
     fn decode(mut coded: EncodedPicture) -> Result<Self, PictureFault> {
         let (size, samples) = (coded.size(), coded.samples());
         let profile = coded.icc_profile().filter(|profile| icc::is_rgb(profile));

@@ -190,6 +190,7 @@ impl<'a> Planner<'a> {
         }
     }
 
+    /// Adds the step of an operator, and frees the slots of its inputs after their last use.
     fn add_step(&mut self, operator: &Operator) -> Result<(), String> {
         let tensor = &self.model.tensors[operator.output];
         let wrong = || format!("an operator cannot make {:?}: {:?}", tensor.name, tensor.shape);

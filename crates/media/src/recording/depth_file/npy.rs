@@ -59,6 +59,7 @@ impl Header {
         Ok((Self::parse(header)?, &file[header_at + length..]))
     }
 
+    /// Parses the header, a Python dictionary with `descr`, `fortran_order` and `shape`.
     fn parse(text: &str) -> Result<Self, PictureFault> {
         let short = || text.trim().chars().take(120).collect::<String>();
         let broken = || PictureFault::Damaged(format!("{:?} is not the header of an array", short()));

@@ -66,7 +66,9 @@ pub fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), F
     let mut rest = strip_padding(&bytes[start + 2..]);
     file.clear();
     file.extend([0xFF, marker::SOI]);
-    let (mut frame, mut has_huffman_tables, mut scans, mut interval) = (None::<Frame>, false, 0, 0);
+    let (mut frame, mut has_huffman_tables) = (None::<Frame>, false);
+    // Number of scans so far, and of coding units between two restarts (0: none).
+    let (mut scans, mut interval) = (0, 0);
     while let Some((code, segment, after)) = next_segment(rest) {
         match code {
             marker::EOI | marker::SOI => break,

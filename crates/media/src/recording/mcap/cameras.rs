@@ -133,6 +133,7 @@ impl Cameras {
     }
 }
 
+/// Reads the calibration of a camera; `None` if the message is too short.
 fn read_info(topic: &str, fields: &mut Fields, encoding: Encoding) -> Option<Info> {
     let (_, frame_id) = message::read_header(fields, encoding)?;
     let (height, width, model) = (fields.u32()?, fields.u32()?, fields.text()?);

@@ -106,6 +106,7 @@ impl<W: Write> FileWriter<W> {
         if is_full { self.write_chunk() } else { Ok(()) }
     }
 
+    /// Writes the collected messages as a chunk without compression, and their index.
     fn write_chunk(&mut self) -> io::Result<()> {
         if self.chunk.is_empty() {
             return Ok(());

@@ -55,8 +55,9 @@ impl App {
         }
         view.picture = Picture::from_memory(Pooled::detached(blurred));
         view.depth = depth.map(Pooled::detached);
-        (view.coc, view.change, view.is_transitional, view.trace.quality) = (coc, change, false, quality);
-        (self.state.focus_m, self.state.is_transitional) = (focus_distance_m(&coc), false);
+        (view.coc, view.change, view.trace.quality) = (coc, change, quality);
+        (view.is_transitional, self.state.is_transitional) = (false, false);
+        self.state.focus_m = focus_distance_m(&coc);
         self.is_depth_drawn = false;
         if self.snapshot_due {
             self.save_snapshot();
