@@ -99,8 +99,7 @@ fn param_spec(property: Property) -> glib::ParamSpec {
         Property::Stats => glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
             .nick("Statistics")
             .blurb(
-                "Counts of received pictures, used and reused depth maps and dropped pictures, and the present \
-                    quality",
+                "Counts of received pictures, used and reused depth maps and dropped pictures, and the present quality",
             )
             .read_only()
             .build(),

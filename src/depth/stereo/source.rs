@@ -103,8 +103,7 @@ impl StereoDepth {
             Some(create_wider) => {
                 (self.matcher, self.disparities) = (create_wider(needed)?, needed);
                 tracing::info!(
-                    "{source_name}: near objects have disparities of {largest_px:.0} px: {needed} are \
-                                searched"
+                    "{source_name}: near objects have disparities of {largest_px:.0} px: {needed} are searched"
                 );
             }
             None => tracing::warn!(

@@ -125,8 +125,7 @@ fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source,
     );
     if source.rig.is_some_and(|rig| !rig.metric) {
         tracing::warn!(
-            "the distance between the two cameras is not known: the metres of this depth are based on an \
-                        assumed one"
+            "the distance between the two cameras is not known: the metres of this depth are based on an assumed one"
         );
     }
     Ok(source)

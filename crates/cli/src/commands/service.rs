@@ -141,9 +141,7 @@ fn print_status(unit: &Unit) -> Result<(), CliError> {
 fn read_stream_arguments(default: &str) -> Result<(String, String), CliError> {
     let no_home = || {
         CliError::Service(
-            "there is no folder for settings: neither XDG_CONFIG_HOME nor HOME is an absolute \
-                              path"
-                .into(),
+            "there is no folder for settings: neither XDG_CONFIG_HOME nor HOME is an absolute path".into(),
         )
     };
     let path = file::user_file().ok_or_else(no_home)?.with_file_name("stream.conf");
@@ -164,11 +162,7 @@ fn read_stream_arguments(default: &str) -> Result<(String, String), CliError> {
 fn unit_path() -> Result<PathBuf, CliError> {
     let config = user_dir("XDG_CONFIG_HOME", ".config");
     let no_folder = || {
-        CliError::Service(
-            "there is no folder for units: neither XDG_CONFIG_HOME nor HOME is an absolute \
-                              path"
-                .into(),
-        )
+        CliError::Service("there is no folder for units: neither XDG_CONFIG_HOME nor HOME is an absolute path".into())
     };
     Ok(config.ok_or_else(no_folder)?.join("systemd/user").join(systemd::NAME))
 }

@@ -141,8 +141,7 @@ impl<W: Write + Send> Sink for Y4m<W> {
         match self.write(frame, time_ns) {
             Err(error) if reader_error_kind(&error) == Some(ErrorKind::TimedOut) => {
                 tracing::warn!(
-                    "{}: its reader has stopped reading, so the last picture is \
-                                incomplete",
+                    "{}: its reader has stopped reading, so the last picture is incomplete",
                     self.name.display()
                 );
                 // The header may be truncated as well: it must not be written again at the end.

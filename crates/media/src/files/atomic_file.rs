@@ -286,13 +286,8 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
 
 /// Splits a path into folder and file name.
 fn split_file_name(path: &Path) -> io::Result<(&Path, &OsStr)> {
-    let name = path.file_name().ok_or_else(|| {
-        io::Error::new(
-            ErrorKind::InvalidInput,
-            "this is not the name of a \
-             file",
-        )
-    })?;
+    let name =
+        path.file_name().ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "this is not the name of a file"))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok((folder, name))
 }

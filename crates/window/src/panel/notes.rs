@@ -116,8 +116,7 @@ fn add_banner(stack: &mut CardStack, state: &State, actions: &mut Vec<Action>) {
         (Source::Running(_), None) => return,
         (Source::Running(_), Some(silent_s)) => {
             silent = tr_with(
-                "{}: no frames for {} s. It continues by itself once frames \
-                         arrive.",
+                "{}: no frames for {} s. It continues by itself once frames arrive.",
                 &[&state.title(), &silent_s],
             );
             ("No picture", silent.as_str(), Some("Try again"))

@@ -325,8 +325,7 @@ fn note_out_of_range_depth(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) 
     if still::map_format(out)? == MapFormat::Png && beyond > 0 {
         let percent = 100.0 * beyond as f32 / depth.metres.len() as f32;
         note(format!(
-            "{percent:.1} % lies beyond {limit_m:.1} m, too far for a .png, and is stored as unknown; use a \
-                      .pfm"
+            "{percent:.1} % lies beyond {limit_m:.1} m, too far for a .png, and is stored as unknown; use a .pfm"
         ));
     }
     Ok(())

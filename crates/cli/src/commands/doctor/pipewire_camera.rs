@@ -57,14 +57,7 @@ pub fn check_pipewire(system: &System) -> PipeWireResults {
     findings.extend(check_refusals());
     findings.extend(BROWSERS.iter().filter(|(programs, ..)| programs.iter().any(|name| is_installed(name))).map(
         |(_, name, switch)| {
-            Finding::note(
-                TOPIC,
-                format!(
-                    "{name} lists PipeWire cameras only after a change of its \
-                     settings"
-                ),
-                *switch,
-            )
+            Finding::note(TOPIC, format!("{name} lists PipeWire cameras only after a change of its settings"), *switch)
         },
     ));
     let readable = all.iter().filter(|camera| has_manager && !camera.process.is_some_and(is_bokehcam));

@@ -126,12 +126,8 @@ impl<E: PairedCamera> StereoPair<E> {
         self.skews.add(skew_ns.unsigned_abs());
         if self.skews.samples() == FIRST_PAIRS {
             let median_ns = self.skews.percentile_ns(0.5);
-            let line = format!(
-                "{}: the frames of the two cameras are {:.1} ms \
-                                apart",
-                self.info.name,
-                median_ns as f64 / 1e6
-            );
+            let line =
+                format!("{}: the frames of the two cameras are {:.1} ms apart", self.info.name, median_ns as f64 / 1e6);
             if median_ns > self.info.period_ns / 4 {
                 tracing::warn!(
                     "{line}: the depth of moving objects will be wrong; cameras with a common trigger avoid this"

@@ -175,8 +175,7 @@ fn negotiate_mode(
     }
     Err(refusal.unwrap_or_else(|| OpenError::NotACamera {
         path: path.to_owned(),
-        what: "it accepts none of the formats that \
-            it offers",
+        what: "it accepts none of the formats that it offers",
     }))
 }
 
@@ -268,10 +267,7 @@ mod tests {
         assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE), Some("it does not stream"));
         assert_eq!(
             said("uvcvideo", sys::V4L2_CAP_META_CAPTURE),
-            Some(
-                "it gives metadata about the pictures of another \
-                 node"
-            )
+            Some("it gives metadata about the pictures of another node")
         );
         assert_eq!(said("vivid", sys::V4L2_CAP_VBI_CAPTURE | streams), Some("it captures no pictures"));
         let unwritten = Some("it is a virtual camera, and nothing writes to it");

@@ -195,8 +195,7 @@ impl DepthSource for SingleCamera {
         let mask = person.as_ref().map(PersonSegmenter::mask);
         if mask.is_some_and(|mask| absence.should_report(mask, stamp.time_ns)) {
             tracing::warn!(
-                "{name}: no person was found for {} s, so everything is \
-                            blurred",
+                "{name}: no person was found for {} s, so everything is blurred",
                 Absence::MIN_REPORTED_NS / 1_000_000_000
             );
         }

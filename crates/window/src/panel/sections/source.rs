@@ -16,8 +16,7 @@ const DEPTH_METHODS: [(&str, &str, DepthMethod); 5] = [
     ("Person", "A network finds the person in the picture", DepthMethod::Person),
     (
         "Person and distance",
-        "Also, another network estimates the distance of everything \
-                             else",
+        "Also, another network estimates the distance of everything else",
         DepthMethod::PersonAndMonoDepth,
     ),
     ("Empty room", "A picture of the room without you: step out for four seconds (T)", DepthMethod::Plate),
