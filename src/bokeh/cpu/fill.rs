@@ -103,8 +103,8 @@ impl Pyramid {
     ) {
         self.compute_base(visible_weight, workers, arch);
         for k in 1..self.levels.len() {
-            let (fine, coarse) = self.levels.split_at_mut(k);
-            let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
+            let (finer, coarser) = self.levels.split_at_mut(k);
+            let (fine, coarse) = (&finer[k - 1], &mut coarser[0]);
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
             let rows = DisjointParts::new(&mut coarse.rows.data, ROWS_PER_ITEM * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(ROWS_PER_ITEM), &|part| {
@@ -115,8 +115,8 @@ impl Pyramid {
             self.directional.fill(level, silhouettes, workers, arch);
         }
         for k in (1..self.levels.len()).rev() {
-            let (fine, coarse) = self.levels.split_at_mut(k);
-            let (fine, coarse) = (&mut fine[k - 1], &coarse[0]);
+            let (finer, coarser) = self.levels.split_at_mut(k);
+            let (fine, coarse) = (&mut finer[k - 1], &coarser[0]);
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
             let rows = DisjointParts::new(&mut fine.rows.data, ROWS_PER_ITEM * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(ROWS_PER_ITEM), &|part| {

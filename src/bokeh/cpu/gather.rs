@@ -68,9 +68,9 @@ impl Gather {
     ) -> ControlFlow<()> {
         let (size, bank) = ((plan.width, plan.height), &*plan.bank);
         let (stride, pad, row_len) = (self.source.stride, self.source.pad, self.source.row_len());
-        let rows = DisjointParts::new(&mut self.source.data, row_len, taken);
+        let padded = DisjointParts::new(&mut self.source.data, row_len, taken);
         workers.run(size.1, &|y| {
-            for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
+            for (p, plane) in padded.part(y).chunks_exact_mut(stride).enumerate() {
                 for (strip, out) in plane[pad..pad + size.0].chunks_mut(STRIP).enumerate() {
                     out.copy_from_slice(&strips.row(strip, y)[p * STRIP..][..out.len()]);
                 }
@@ -94,9 +94,9 @@ impl Gather {
             return ControlFlow::Continue(());
         }
         let rows = &mut self.rows[..bank.terms * 3 * size.0 * size.1];
-        let rows = DisjointParts::new(rows, bank.terms * 3 * size.0, taken);
+        let filtered = DisjointParts::new(rows, bank.terms * 3 * size.0, taken);
         workers.run(size.1, &|y| {
-            arch.dispatch(GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
+            arch.dispatch(GatherRow { source, width: size.0, bank, coc: coc(y), y, out: filtered.part(y) });
         });
         let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
         let rows = &self.rows;

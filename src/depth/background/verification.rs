@@ -177,16 +177,15 @@ impl Comparison<'_> {
             }
             let known = |at: usize| (self.memory.rounds[at] >= MIN_ROUNDS).then(|| self.memory.inverse[at]);
             let is_there = |inverse: f32| (near - inverse).abs() <= surface_step;
-            match () {
-                () if known(at).is_some_and(is_there) && self.has_changed(second) => {
+            if known(at).is_some_and(is_there) {
+                if self.has_changed(second) {
                     evidence.add_contradiction((near - surface_step, near + surface_step));
+                } else {
+                    evidence.agreeing = evidence.agreeing.saturating_add(1);
                 }
-                () if known(at).is_some_and(is_there) => evidence.agreeing = evidence.agreeing.saturating_add(1),
+            } else if known(first.1 * width + first.0).is_some_and(|inverse| near - inverse > surface_step) {
                 // The surface is new: it hides a background that was seen.
-                () if known(first.1 * width + first.0).is_some_and(|inverse| near - inverse > surface_step) => {
-                    evidence.add_contradiction((0.0, near - surface_step));
-                }
-                () => {}
+                evidence.add_contradiction((0.0, near - surface_step));
             }
         }
     }

@@ -41,9 +41,9 @@ pub(super) fn add_depth(
             ));
         }
     };
-    let depth = PlateDepth::new(plate, create_lock(name), companion);
-    let guide = Some(depth.guide());
-    let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
+    let plate_depth = PlateDepth::new(plate, create_lock(name), companion);
+    let guide = Some(plate_depth.guide());
+    let depth: Option<Box<dyn DepthSource>> = Some(Box::new(plate_depth));
     let depth_from = if about.is_some() { DepthOrigin::Networks } else { DepthOrigin::Plate };
     Ok(Source { depth, depth_from, networks: about, guide, ..source })
 }

@@ -139,15 +139,15 @@ pub(super) fn decode_nv12(image: &RawImage, into: &mut ColorImage) -> Result<(),
     let row_bytes = width.next_multiple_of(2) as usize;
     let luma_bytes = image.stride_bytes.saturating_mul(height as usize);
     let (luma, chroma) = image.data.split_at_checked(luma_bytes).ok_or(PictureFault::Truncated)?;
-    let luma = rows(&RawImage { data: luma, ..image.clone() }, row_bytes)?;
+    let luma_rows = rows(&RawImage { data: luma, ..image.clone() }, row_bytes)?;
     let chroma_size = (width, height.div_ceil(2));
-    let chroma = rows(&RawImage { data: chroma, size: chroma_size, ..image.clone() }, row_bytes)?;
+    let chroma_rows = rows(&RawImage { data: chroma, size: chroma_size, ..image.clone() }, row_bytes)?;
     into.resize(width, height);
-    let chroma = chroma.flat_map(|row| [row; 2]);
-    for ((luma, chroma), out) in luma.zip(chroma).zip(into.rgb.chunks_exact_mut(3 * width as usize)) {
-        let chroma = chroma.as_chunks::<2>().0.iter().flat_map(|pair| [pair; 2]);
-        for ((&y, &[cb, cr]), out) in luma.iter().zip(chroma).zip(out.as_chunks_mut::<3>().0) {
-            *out = to_rgb([y, cb, cr]);
+    let row_pairs = luma_rows.zip(chroma_rows.flat_map(|row| [row; 2]));
+    for ((luma_row, chroma_row), out) in row_pairs.zip(into.rgb.chunks_exact_mut(3 * width as usize)) {
+        let chroma = chroma_row.as_chunks::<2>().0.iter().flat_map(|pair| [pair; 2]);
+        for ((&y, &[cb, cr]), pixel) in luma_row.iter().zip(chroma).zip(out.as_chunks_mut::<3>().0) {
+            *pixel = to_rgb([y, cb, cr]);
         }
     }
     Ok(())

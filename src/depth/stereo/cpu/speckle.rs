@@ -50,16 +50,16 @@ impl SpeckleFilter {
         let bands = Bands::new(map.len() / width, 1, workers);
         let mut run_range: [Range<usize>; MAX_ITEMS] = std::array::from_fn(|_| 0..0);
         let (runs, parents) = (bands.split(&mut self.runs, width), bands.split(&mut self.parents, width));
-        let items = bands.rows().zip(runs.zip(parents)).zip(bands.split(&mut self.pixels, width)).zip(&mut run_range);
+        let parts = bands.rows().zip(runs.zip(parents)).zip(bands.split(&mut self.pixels, width)).zip(&mut run_range);
         let items =
-            items.map(|(((rows, (runs, parents)), pixels), run_range)| Band { rows, runs, parents, pixels, run_range });
+            parts.map(|(((rows, (runs, parents)), pixels), run_range)| Band { rows, runs, parents, pixels, run_range });
         workers.run_each(items, &|band| band.find_components(map, width));
         for pair in run_range.windows(2) {
             self.join_bands(&pair[0], &pair[1], map, width);
         }
         let Self { runs, parents, pixels } = self;
-        let items = bands.rows().zip(bands.split(map, width)).zip(&run_range);
-        workers.run_each(items, &|((rows, map), run_range)| {
+        let parts = bands.rows().zip(bands.split(map, width)).zip(&run_range);
+        workers.run_each(parts, &|((rows, map), run_range)| {
             for place in run_range.clone() {
                 if pixels[root_of(parents, place)] <= max_pixels {
                     let Run { y, start, end } = runs[place];

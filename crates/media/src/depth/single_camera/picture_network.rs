@@ -100,8 +100,7 @@ impl PictureNetwork {
         let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return Err(format!(
-                "its input is {width} x {height} pixels, and at most {MAX_SIDE} per side are \
-                                supported"
+                "its input is {width} x {height} pixels, and at most {MAX_SIDE} per side are supported"
             ));
         }
         let outputs = &network.outputs;
@@ -114,18 +113,18 @@ impl PictureNetwork {
         if recurrent_states.len() != others.count() || recurrent_states.iter().any(|&(_, state)| state == output) {
             return Err("it has inputs other than a picture and its own earlier output".to_owned());
         }
-        let inputs = (0..inputs.len()).map(|k| match k {
+        let first_inputs = (0..inputs.len()).map(|k| match k {
             _ if k == picture => Tensor::zeros(&if is_planar { [1, 3, height, width] } else { [1, height, width, 3] }),
             _ if is_ratio(&inputs[k]) => Tensor { shape: vec![1], values: vec![1.0] },
             // Variable sizes of states are 1 at first: one number is broadcast.
             _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
         });
-        let inputs = inputs.collect();
-        let usual = match task {
+        let inputs = first_inputs.collect();
+        let usual_scaling = match task {
             Task::Matte => Scaling::UNIT,
             Task::Mono => Scaling::IMAGENET,
         };
-        let scaling = hints.scaling.or(known.map(|known| known.scaling)).unwrap_or(usual);
+        let scaling = hints.scaling.or(known.map(|known| known.scaling)).unwrap_or(usual_scaling);
         let bgr = hints.bgr.or(known.map(|known| known.bgr)).unwrap_or(false);
         Ok(Self {
             network,

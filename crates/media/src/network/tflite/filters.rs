@@ -102,11 +102,11 @@ pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: u
             if !rows.contains(&tap) {
                 pixels.for_each(|out| *out = 0.0);
             } else if from < to {
-                let line =
+                let start =
                     channel / size.lanes * size.plane() + (first_row + tap - rows.start) * size.columns * size.lanes;
-                let line = &input[line..][..size.columns * size.lanes];
-                let line = &line[(from * across.step + column - across.padding) * size.lanes..];
-                pixels.zip(line.chunks(across.step * size.lanes)).for_each(|(out, input)| *out = input[lane]);
+                let line = &input[start..][..size.columns * size.lanes];
+                let tapped = &line[(from * across.step + column - across.padding) * size.lanes..];
+                pixels.zip(tapped.chunks(across.step * size.lanes)).for_each(|(out, input)| *out = input[lane]);
             }
         }
     }

@@ -43,6 +43,7 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, GeometryError>
             _ => Err(wrong(line, key, "a whole number of pixels", value)),
         },
     };
+    // Line, focal length, and column of the principal point, in pixels.
     let camera = |key: &str| match find(key) {
         None => Ok(None),
         Some((line, value)) => match parse_numbers::<9>(value).filter(|matrix| matrix[0] > 0.0) {
