@@ -91,7 +91,7 @@ impl VirtualBackground {
                 rgb.copy_from_slice(background);
                 metres.fill(lens.focus_m);
             } else if fractions.iter().any(|&fraction| fraction > 0.0) {
-                self.blend(rgb, background, metres, (fractions, lens));
+                self.blend(rgb, background, metres, fractions, lens);
             }
         }
         for &CompositedPixel { at, rgb, metres } in &self.composited {
@@ -101,7 +101,7 @@ impl VirtualBackground {
     }
 
     /// Blends pixels with the virtual background by the weights `fractions`, 0 to 1.
-    fn blend(&self, rgb: &mut [u8], background: &[u8], metres: &mut [f32], (fractions, lens): (&[f32], &DepthCoc)) {
+    fn blend(&self, rgb: &mut [u8], background: &[u8], metres: &mut [f32], fractions: &[f32], lens: &DepthCoc) {
         let pixels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(background.as_chunks::<3>().0);
         for (((pixel, background), metres), &fraction) in pixels.zip(metres).zip(fractions) {
             *metres = pull_to_focus(*metres, fraction, lens);
@@ -151,10 +151,10 @@ impl VirtualBackground {
             Background::Blur => {}
             Background::Color(rgb) => self.scaled.rgb.as_chunks_mut::<3>().0.fill(*rgb),
             Background::Picture(picture) => {
-                scale_to_cover(&picture.image, &mut self.scaled, (&mut self.scale, &mut self.row));
+                scale_to_cover(&picture.image, &mut self.scaled, &mut self.scale, &mut self.row);
             }
             Background::Video(video) => {
-                scale_to_cover(video.first(), &mut self.scaled, (&mut self.scale, &mut self.row));
+                scale_to_cover(video.first(), &mut self.scaled, &mut self.scale, &mut self.row);
             }
             // Premultiplied: where nothing is, there is no light.
             Background::Transparent => self.scaled.rgb.fill(0),
@@ -205,7 +205,7 @@ pub fn cover_size(from: (u32, u32), into: (u32, u32)) -> (u32, u32) {
 }
 
 /// Scales a picture so that it covers `into`, and crops the rest equally on both sides.
-fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, (scale, row): (&mut RowScaler, &mut Vec<u16>)) {
+fn scale_to_cover(from: &ColorImage, into: &mut ColorImage, scale: &mut RowScaler, row: &mut Vec<u16>) {
     let [from_width, from_height, width, height] =
         [from.width, from.height, into.width, into.height].map(|side| side as usize);
     let whole = cover_size(from.size(), into.size());

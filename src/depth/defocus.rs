@@ -46,7 +46,7 @@ pub fn estimate_depth(color: &ColorImage) -> Option<DepthMap> {
     if soft_px < sharp_px + MIN_RANGE_PX {
         return None;
     }
-    let blur_px = propagate_blur(color, &edges, (size, factor));
+    let blur_px = propagate_blur(color, &edges, size, factor);
     let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     for (metres, blur_px) in map.metres.iter_mut().zip(blur_px) {
         let nearness = 1.0 - ((blur_px - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
@@ -151,7 +151,7 @@ fn gaussian_blur(plane: &[f32], (width, height): (usize, usize), deviation_px: f
 /// Propagates the known blur values along similar colours (domain transform, recursive filter). `known` belongs to a
 /// picture of `size` pixels, each of which covers `factor` x `factor` pixels of `color`. Values and weights are
 /// filtered alike (normalised convolution).
-fn propagate_blur(color: &ColorImage, known: &[f32], (size, factor): ((usize, usize), usize)) -> Vec<f32> {
+fn propagate_blur(color: &ColorImage, known: &[f32], size: (usize, usize), factor: usize) -> Vec<f32> {
     let (width, height) = (color.width as usize, color.height as usize);
     let mut sums = vec![[0.0; 2]; width * height];
     for (at, &blur_px) in known.iter().enumerate().filter(|(_, blur_px)| blur_px.is_finite()) {

@@ -80,7 +80,8 @@ impl Reducer {
     fn reduce_row(
         &mut self,
         color: &ColorImage,
-        (block_px, across): (usize, usize),
+        block_px: usize,
+        across: usize,
         row: usize,
         reduced: &mut Vec<[f32; 3]>,
     ) {
@@ -127,7 +128,7 @@ impl WithSimd for Reduce<'_> {
         let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));
         reduced.clear();
         for row in 0..down {
-            reducer.reduce_row(color, (block_px, across), row, reduced);
+            reducer.reduce_row(color, block_px, across, row, reduced);
         }
     }
 }

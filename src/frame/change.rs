@@ -189,7 +189,7 @@ impl Prediction {
 
     /// Marks the units, `across` tiles wide, of some rows of tiles where the frame differs from the held content.
     pub fn find_changed(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
-        mark_different(&self.now, &self.held, &self.bounds, (rows, across), units);
+        mark_different(&self.now, &self.held, &self.bounds, rows, across, units);
     }
 
     /// Replaces the held content of the marked units by the current frame's.
@@ -207,7 +207,7 @@ impl Prediction {
     pub fn find_outdated(&self, rows: Range<usize>, across: usize, units: &mut [bool]) {
         let [luma, chroma] = RESULT_BOUND;
         let bounds = [luma, chroma, chroma, RESULT_COC_BOUND * self.bounds[3]];
-        mark_different(&self.held, &self.made, &bounds, (rows, across), units);
+        mark_different(&self.held, &self.made, &bounds, rows, across, units);
     }
 
     /// Notes that the results of the marked units are made of the held content.
@@ -245,7 +245,8 @@ fn mark_different(
     a: &TileMeans,
     b: &TileMeans,
     bounds: &[f32; MEANS],
-    (rows, across): (Range<usize>, usize),
+    rows: Range<usize>,
+    across: usize,
     units: &mut [bool],
 ) {
     for row in rows.start.saturating_sub(1)..(rows.end + 1).min(a.down) {

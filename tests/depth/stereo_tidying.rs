@@ -33,7 +33,7 @@ fn tidied(device: &Device, size: (usize, usize), max_speckle: u32, map: &[u16]) 
     let mut recorder = Recorder::new(device, None);
     create_passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.record(pass));
     let take = |bytes: &[u8]| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect();
-    recorder.submit_and_read(device, &mut back, (&out, out.size()), take).expect("the device is there")
+    recorder.submit_and_read(device, &mut back, &out, out.size(), take).expect("the device is there")
 }
 
 /// The reference: the same result, pixel by pixel.

@@ -25,7 +25,7 @@ const MIN_FAR_M: f32 = 1.0;
 
 /// Warns of depth in another unit than assumed, or of a focus in metres that nothing in `map` is near. `scale` is that
 /// of `--depth-scale`, if any, and `size` that of the picture, in pixels.
-pub fn warn_of_distances(look: &Look, size: (u32, u32), map: &DepthMap, (from, scale): (DepthOrigin, Option<f32>)) {
+pub fn warn_of_distances(look: &Look, size: (u32, u32), map: &DepthMap, from: DepthOrigin, scale: Option<f32>) {
     let in_units = from == DepthOrigin::Units;
     if in_units
         && scale.is_none()

@@ -65,7 +65,7 @@ impl GpuBokeh {
         let mut readback = Readback::new(device, "probe back", bytes as usize);
         let mut recorder = Recorder::new(device, None);
         recorder.encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &part, 0, bytes);
-        Ok(recorder.submit_and_read(device, &mut readback, (&part, bytes), bytemuck::pod_collect_to_vec)?)
+        Ok(recorder.submit_and_read(device, &mut readback, &part, bytes, bytemuck::pod_collect_to_vec)?)
     }
 }
 

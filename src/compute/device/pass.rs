@@ -80,7 +80,8 @@ impl<'a> Recorder<'a> {
         mut self,
         device: &Device,
         readback: &mut Readback,
-        (source, bytes): (&wgpu::Buffer, u64),
+        source: &wgpu::Buffer,
+        bytes: u64,
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
         readback.record_copy(&mut self.encoder, source, bytes);

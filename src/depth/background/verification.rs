@@ -33,7 +33,7 @@ pub struct OutlineEvidence {
 }
 
 impl OutlineEvidence {
-    fn add_contradiction(&mut self, (least, most): (f32, f32)) {
+    fn add_contradiction(&mut self, least: f32, most: f32) {
         let is_first = self.contradicting == 0;
         self.least = if is_first { least } else { self.least.min(least) };
         self.most = if is_first { most } else { self.most.max(most) };
@@ -179,13 +179,13 @@ impl Comparison<'_> {
             let is_there = |inverse: f32| (near - inverse).abs() <= surface_step;
             if known(at).is_some_and(is_there) {
                 if self.has_changed(second) {
-                    evidence.add_contradiction((near - surface_step, near + surface_step));
+                    evidence.add_contradiction(near - surface_step, near + surface_step);
                 } else {
                     evidence.agreeing = evidence.agreeing.saturating_add(1);
                 }
             } else if known(first.1 * width + first.0).is_some_and(|inverse| near - inverse > surface_step) {
                 // The surface is new: it hides a background that was seen.
-                evidence.add_contradiction((0.0, near - surface_step));
+                evidence.add_contradiction(0.0, near - surface_step);
             }
         }
     }

@@ -232,7 +232,7 @@ impl Matting {
         self.trace_pixels(workers, (&*map, color), depth_step, background);
         let Self { clusters, pixels, wide, order, traced, .. } = self;
         wide.discard_wide(size, pixels);
-        sort_mixed(size.0, pixels, on_edges, (order, traced));
+        sort_mixed(size.0, pixels, on_edges, order, traced);
 
         let each = bands::chunk_len(order.len(), MIN_PIXELS);
         let found = &mut map.matte.pixels;
@@ -299,7 +299,7 @@ fn log_noise(is_noise: bool, is_logged: &mut bool) {
 
 /// Replaces `order` by the indices of the mixed pixels in raster order. The `first` ones are in order already, the rest
 /// is sorted in `rest` and merged.
-fn sort_mixed(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
+fn sort_mixed(width: usize, pixels: &[Pixel], first: usize, order: &mut Vec<u32>, rest: &mut Vec<u64>) {
     const PLACE_BITS: u32 = 32;
     let key = |k: usize| (pixels[k].index(width) as u64) << PLACE_BITS | k as u64;
     let mixed = |places: Range<usize>| places.filter(|&k| pixels[k].is_mixed());

@@ -178,7 +178,7 @@ impl Pictures<'_> {
 
     /// Adopts a vector for a surface if it is the best so far.
     #[inline(always)]
-    fn try_vector(&self, (place, is_near): ((usize, usize), Option<bool>), surface: &mut Surface, vector: Vector) {
+    fn try_vector(&self, place: (usize, usize), is_near: Option<bool>, surface: &mut Surface, vector: Vector) {
         let length_px = |vector: Vector| (vector[0].abs() + vector[1].abs()) as f32;
         let most = surface.residual + COST_PER_PX * (length_px(surface.vector) - length_px(vector));
         if let Some(residual) = self.mean_difference(place, vector, is_near).filter(|residual| *residual < most) {
@@ -215,13 +215,13 @@ impl Pictures<'_> {
                 };
                 let compared = is_split.then_some(is_near);
                 for &vector in &rough[..count] {
-                    self.try_vector((place, compared), surface, vector);
+                    self.try_vector(place, compared, surface, vector);
                 }
                 let mut step = (scale / 2).max(1);
                 while step > 0 {
                     let [x, y] = surface.vector;
                     for by in STEPS {
-                        self.try_vector((place, compared), surface, [x + step * by[0], y + step * by[1]]);
+                        self.try_vector(place, compared, surface, [x + step * by[0], y + step * by[1]]);
                     }
                     if surface.vector == [x, y] || step > 1 {
                         step /= 2;

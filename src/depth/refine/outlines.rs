@@ -21,10 +21,10 @@ impl Outlines {
         self.before.clear();
         self.before.extend_from_slice(inverse);
         for y in 0..height {
-            self.filter_line(inverse, unknown, (y * width, 1, width), distance_px);
+            self.filter_line(inverse, unknown, y * width, 1, width, distance_px);
         }
         for x in 0..width {
-            self.filter_line(inverse, unknown, (x, width, height), distance_px);
+            self.filter_line(inverse, unknown, x, width, height, distance_px);
         }
         for (value, &before) in inverse.iter_mut().zip(&self.before) {
             if (*value - before).abs() <= depth_step {
@@ -39,7 +39,9 @@ impl Outlines {
         &mut self,
         inverse: &mut [f32],
         unknown: &[bool],
-        (first, step, len): (usize, usize, usize),
+        first: usize,
+        step: usize,
+        len: usize,
         distance_px: i32,
     ) {
         let (radius, outwards) = (distance_px.unsigned_abs() as usize, distance_px > 0);

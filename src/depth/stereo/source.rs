@@ -92,7 +92,7 @@ impl StereoDepth {
         let (source_name, calibrated) = (&self.source_name, self.rectifier.is_some());
         // Twice the range, so that objects nearer than expected are found, too.
         let found = check_pair(&self.left, right, (2 * self.disparities).min(Settings::MAX_DISPARITIES))?;
-        let clear = log_verdict((source_name, calibrated), found.verdict());
+        let clear = log_verdict(source_name, calibrated, found.verdict());
         self.checks_left = if clear { 0 } else { self.checks_left - 1 };
         let needed = (found.largest_px.ceil() as u32 + MARGIN_PX).next_multiple_of(16).min(Settings::MAX_DISPARITIES);
         if found.verdict() != Verdict::Rectified || found.largest_px < self.disparities as f32 {
@@ -128,7 +128,7 @@ impl StereoDepth {
 
 /// Logs the verdict on a pair that is supposed to be rectified; `calibrated` says whether it was rectified here.
 /// Returns false if the verdict is unclear.
-fn log_verdict((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool {
+fn log_verdict(source_name: &str, calibrated: bool, verdict: Verdict) -> bool {
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
         Verdict::Misaligned { .. } if calibrated => tracing::warn!(

@@ -148,7 +148,7 @@ impl Opened {
         unused::warn_of_unused(&given.settings, &unused.for_look(origin, source.depth_from, &look));
         source.findings.notes.iter().for_each(|note| log::note(note));
         if let Some(map) = source.first_depth.as_ref() {
-            focus::warn_of_distances(&look, info.size, map, (source.depth_from, options.depth.depth_scale));
+            focus::warn_of_distances(&look, info.size, map, source.depth_from, options.depth.depth_scale);
         }
         Ok(Self { source, options, info, look, facts, pace, unused })
     }

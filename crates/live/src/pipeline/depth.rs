@@ -90,7 +90,7 @@ impl<'a> Stage<'a> {
             }
             let (mut frame, CapturedFrame { mut color, depth, right, .. }) = frame.take_item(clock.now_ns());
             let reused_before = self.times.reused;
-            let (depth, coc) = match self.compute_depth_and_coc((depth, right), &mut color, frame.stamp) {
+            let (depth, coc) = match self.compute_depth_and_coc(depth, right, &mut color, frame.stamp) {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
@@ -177,7 +177,8 @@ impl<'a> Stage<'a> {
     /// for every frame needs no depth.
     fn compute_depth_and_coc(
         &mut self,
-        (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
+        brought: Option<Pooled<DepthMap>>,
+        right: Option<Pooled<GrayImage>>,
         color: &mut ColorImage,
         stamp: Stamp,
     ) -> Result<Made, Fault> {
@@ -208,7 +209,7 @@ impl<'a> Stage<'a> {
         self.preprocessor.take_warning().into_iter().for_each(|remark| tracing::warn!("{}: {remark}", info.name));
         self.times.took.add(clock.now_ns() - began_ns);
         if let Some(scheduler) = &mut self.scheduler {
-            scheduler.store_depth((&map, field), color);
+            scheduler.store_depth(&map, field, color);
         }
         Ok((Some(map), field))
     }

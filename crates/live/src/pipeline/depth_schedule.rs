@@ -72,7 +72,7 @@ impl<'a> DepthScheduler<'a> {
     }
 
     /// Keeps newly computed depth of a picture if later frames may reuse it.
-    pub(super) fn store_depth(&mut self, (map, field): (&DepthMap, CocField), color: &ColorImage) {
+    pub(super) fn store_depth(&mut self, map: &DepthMap, field: CocField, color: &ColorImage) {
         self.age = 1;
         // The first one in any case, so that memory is allocated now and not during a later frame.
         if self.shared_plan.get().0 > 1 || self.held.is_empty() {
@@ -101,7 +101,7 @@ mod tests {
             let mut frame = |_| {
                 let held = scheduler.reuse_next().is_some();
                 if !held {
-                    scheduler.store_depth((&map, CocField::Uniform { radius_px: 1.0 }), &ColorImage::new(2, 2));
+                    scheduler.store_depth(&map, CocField::Uniform { radius_px: 1.0 }, &ColorImage::new(2, 2));
                 }
                 held
             };

@@ -77,7 +77,7 @@ impl WithSimd for RawEncode<'_, '_> {
                 Family::Rgb24 { swapped } => write_rgb(row, out, swapped, layout.range),
                 Family::Packed422 { luma, cb, .. } => {
                     load_sums(sums, row, None);
-                    write_packed(converter, row, sums, out, (luma, cb));
+                    write_packed(converter, row, sums, out, luma, cb);
                 }
                 _ => {
                     for (luma, pixel) in out.iter_mut().zip(row.as_chunks::<3>().0) {
@@ -176,7 +176,7 @@ fn chroma_sums(sums: &[Vec<u16>; 3]) -> impl Iterator<Item = [i32; 3]> + '_ {
 /// Writes a row of 4:2:2, in which `luma` and `cb` are the offsets of the first luma and of the Cb sample. Half a pair,
 /// at an odd edge, has one chroma sample.
 #[inline(always)]
-fn write_packed(converter: &Converter, row: &[u8], sums: &[Vec<u16>; 3], out: &mut [u8], (luma, cb): (usize, usize)) {
+fn write_packed(converter: &Converter, row: &[u8], sums: &[Vec<u16>; 3], out: &mut [u8], luma: usize, cb: usize) {
     let cr = cb ^ 2;
     let (pairs, rest) = out.as_chunks_mut::<4>();
     let (colors, last) = row.as_chunks::<6>();

@@ -50,7 +50,8 @@ impl HeldBlur {
         &mut self,
         look: &Look,
         change: u64,
-        (threads, services): (usize, &mut dyn Services),
+        threads: usize,
+        services: &mut dyn Services,
     ) -> Result<Still, String> {
         let Still { number, images, coc, .. } = &self.held;
         let fixed = if look.focus == self.focus { look.for_frame(coc, None) } else { look.clone() };

@@ -177,7 +177,7 @@ fn read_mixed_pixels(
     most: usize,
 ) -> Result<[usize; 2], GpuError> {
     const EACH: usize = size_of::<MixedPixel>();
-    recorder.submit_and_read(device, &mut b.readback, (&b.mixed, ((1 + most) * EACH) as u64), |bytes| {
+    recorder.submit_and_read(device, &mut b.readback, &b.mixed, ((1 + most) * EACH) as u64, |bytes| {
         // The first record has the counts.
         let (head, bytes) = bytes.split_at(EACH);
         let [found, edges] =

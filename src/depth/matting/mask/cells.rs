@@ -209,7 +209,8 @@ impl MaskView<'_> {
     pub fn compute_contrast<S: Simd>(
         &self,
         simd: S,
-        (kernel, sums): (&Kernel, &[Sums]),
+        kernel: &Kernel,
+        sums: &[Sums],
         (row, column): (usize, usize),
     ) -> Option<Contrast> {
         let mut around = Sums::NONE;

@@ -144,7 +144,7 @@ impl pulp::WithSimd for ComputeMatte<'_> {
             let is_beside = || cells[at] == Cell::Band || view.cells_within(at, 1).any(|at| cells[at] == Cell::Band);
             let place = (at / across, at % across);
             let is_used = follows_color && needed[at] && is_beside();
-            contrasts.push(if is_used { view.compute_contrast(simd, (kernel, sums), place) } else { None });
+            contrasts.push(if is_used { view.compute_contrast(simd, kernel, sums, place) } else { None });
         }
         alphas.resize(width * height, 0.0);
         front.clear();

@@ -232,7 +232,7 @@ impl Resources {
         for (from, to) in copy.iter().flat_map(|copy| [(&*refined, &copy.metres), (rgb, &copy.rgb)]) {
             recorder.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
         }
-        recorder.submit_and_read(device, readback, (refined, refined.size()), |bytes| {
+        recorder.submit_and_read(device, readback, refined, refined.size(), |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();

@@ -164,7 +164,7 @@ impl Executor for GpuExecutor {
         let mut recorder = Recorder::new(device, stamps.as_mut());
         passes.iter().for_each(|pass| recorder.record(pass));
         recorder.encoder.copy_buffer_to_buffer(luma, 0, last_luma, 0, last_luma.size());
-        recorder.submit_and_read(device, readback, (words, words.size()), |bytes| {
+        recorder.submit_and_read(device, readback, words, words.size(), |bytes| {
             let each = bands::chunk_len(out.len(), MIN_PIXELS_PER_THREAD);
             workers.run_each(out.chunks_mut(each).zip(bytes.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
                 for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {

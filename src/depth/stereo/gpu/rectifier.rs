@@ -48,7 +48,7 @@ impl CameraRectifier {
         let mut recorder = Recorder::new(device, None);
         recorder.record(&self.pass);
         let (rectified, length) = (&self.rectified, into.len());
-        recorder.submit_and_read(device, &mut self.readback, (rectified, rectified.size()), |bytes| {
+        recorder.submit_and_read(device, &mut self.readback, rectified, rectified.size(), |bytes| {
             into.copy_from_slice(&bytes[..length]);
         })
     }

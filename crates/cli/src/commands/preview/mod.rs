@@ -138,7 +138,7 @@ pub fn show_source(
         stop: terminal::stop_flag()?,
     })
     .map_err(|error| CliError::Part(error.into()))?;
-    conclude(outcome, close_at_end, stream.report.as_deref(), (output.force, global))
+    conclude(outcome, close_at_end, stream.report.as_deref(), output.force, global)
 }
 
 /// Refuses options that make no sense for a window.
@@ -179,7 +179,8 @@ fn conclude(
     outcome: PreviewOutcome,
     closes_at_end: bool,
     report: Option<&Path>,
-    (force, global): (bool, &Global),
+    force: bool,
+    global: &Global,
 ) -> Result<(), CliError> {
     let written = match (report, &outcome.report) {
         (Some(path), Some(report)) => report::write_report(path, report, force),

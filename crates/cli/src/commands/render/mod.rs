@@ -251,7 +251,7 @@ impl RenderCommand {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
             Some(Depth::Measured(map) | Depth::Final(map)) => {
-                focus::warn_of_distances(look, color.size(), map, (depth_from, self.depth.depth_scale));
+                focus::warn_of_distances(look, color.size(), map, depth_from, self.depth.depth_scale);
             }
             None => {}
         }

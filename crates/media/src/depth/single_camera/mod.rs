@@ -163,7 +163,8 @@ impl SingleCamera {
 /// Runs the depth network around the subject in `mask` if it is due; disables it on an error.
 fn run_depth_network(
     relative_depth: &mut Option<RelativeDepth>,
-    (name, due): (&str, DueNetworks),
+    name: &str,
+    due: DueNetworks,
     color: &ColorImage,
     mask: Option<&Mask>,
 ) {
@@ -206,7 +207,7 @@ impl DepthSource for SingleCamera {
             map.copy_from(held);
             return Ok(());
         }
-        run_depth_network(relative_depth, (name, *due), color, mask);
+        run_depth_network(relative_depth, name, *due, color, mask);
         if let (Some(mask), Some(relative_depth)) = (mask, &relative_depth) {
             subject_mask.complete_mask(mask, relative_depth);
         }
@@ -266,7 +267,7 @@ impl Companion for SingleCamera {
     }
 
     fn measure_background(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
-        run_depth_network(&mut self.relative_depth, (&self.name, self.due), color, Some(mask));
+        run_depth_network(&mut self.relative_depth, &self.name, self.due, color, Some(mask));
         if let Some(relative_depth) = &self.relative_depth {
             self.upsampler.upsample(relative_depth.background(), relative_depth.size(), map);
         }

@@ -94,7 +94,7 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor) {
 fn show_save_dialog(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor) -> Dialog {
     let is_there = form.state.presets.iter().any(|preset| preset.is_user_defined && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
-    match add_name_field(ui, editing, verb, (by_enter, form.is_cancelled(ui))) {
+    match add_name_field(ui, editing, verb, by_enter, form.is_cancelled(ui)) {
         Some(true) => form.push_action(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
@@ -133,7 +133,7 @@ fn show_list_dialog(ui: &mut Ui, form: &PanelForm, editing: &mut PresetEditor) -
 
 fn show_rename_dialog(ui: &mut Ui, form: &mut PanelForm, editing: &mut PresetEditor, old: String) -> Dialog {
     let new = editing.name.trim().to_owned();
-    match add_name_field(ui, editing, "Rename", (true, form.is_cancelled(ui))) {
+    match add_name_field(ui, editing, "Rename", true, form.is_cancelled(ui)) {
         Some(true) if new != old => form.push_action(Action::RenamePreset(old, new)),
         Some(_) => {}
         None => return Dialog::Renaming(old),
@@ -159,7 +159,8 @@ fn add_name_field(
     ui: &mut Ui,
     editing: &mut PresetEditor,
     verb: &str,
-    (by_enter, is_cancelled): (bool, bool),
+    by_enter: bool,
+    is_cancelled: bool,
 ) -> Option<bool> {
     ui.horizontal_wrapped(|ui| {
         let width = ui.available_width().min(140.0);

@@ -51,7 +51,7 @@ impl SessionWorker {
     /// Blurs the held frame with the latest look.
     fn reblur_held(&mut self) {
         if let (Some(held), Some((number, look))) = (&mut self.held, self.looks.back()) {
-            match held.reblur(look, *number, (self.config.threads, &mut *self.config.services)) {
+            match held.reblur(look, *number, self.config.threads, &mut *self.config.services) {
                 Ok(blurred) => self.events.send(SessionEvent::Reblurred(Box::new(blurred))),
                 Err(line) => self.events.note(line),
             }
