@@ -167,9 +167,10 @@ impl Band<'_> {
         )
     }
 
-    /// Adds some columns of a block to the bins.
+    /// Returns which bins some columns of a block contribute to, and how many rows beyond the band they need; clears the
+    /// other bins there.
     #[inline(always)]
-    fn process_run<V: Simd>(&mut self, simd: V, run: Run, making: Making) {
+    fn find_active_bins(&mut self, run: Run, making: Making) -> ([bool; MAX_BINS], isize) {
         let Run { block, x0, columns, .. } = run;
         let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns.next_multiple_of(TILE_W));
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
@@ -191,6 +192,14 @@ impl Band<'_> {
                 false => bin.clear(run),
             }
         }
+        (active, support)
+    }
+
+    /// Adds some columns of a block to the bins.
+    #[inline(always)]
+    fn process_run<V: Simd>(&mut self, simd: V, run: Run, making: Making) {
+        let Run { x0, columns, .. } = run;
+        let (active, support) = self.find_active_bins(run, making);
         let is_read = matches!(self.inpainting, Inpainting::Pending { .. });
         if !active.contains(&true) && !is_read {
             return;

@@ -231,7 +231,10 @@ fn serve_sink(
                 shared.repeats.fetch_add(repeats, Ordering::Relaxed);
                 flow.map_continue(|_| ())
             }),
-            Received::Ended => break,
+            Received::Ended => match shared.ending.get() {
+                Some(ending) => return Outcome::Ended(sink.finish(*ending)),
+                None => return Outcome::Ended(Ok(())),
+            },
         };
         match flow {
             Ok(ControlFlow::Continue(())) => {}
@@ -242,10 +245,6 @@ fn serve_sink(
             // Not finished: a sink that fails has kept its output itself.
             Err(error) => return Outcome::Failed(error),
         }
-    }
-    match shared.ending.get() {
-        Some(ending) => Outcome::Ended(sink.finish(*ending)),
-        None => Outcome::Ended(Ok(())),
     }
 }
 
