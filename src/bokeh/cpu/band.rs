@@ -167,8 +167,8 @@ impl Band<'_> {
         )
     }
 
-    /// Returns which bins some columns of a block contribute to, and how many rows beyond the band they need; clears the
-    /// other bins there.
+    /// Returns which bins some columns of a block contribute to, and how many rows beyond the band these need; clears
+    /// the other bins there.
     #[inline(always)]
     fn find_active_bins(&mut self, run: Run, making: Making) -> ([bool; MAX_BINS], isize) {
         let Run { block, x0, columns, .. } = run;
