@@ -23,17 +23,17 @@ const RESULT_SIZE: (usize, usize) = (64, 16);
 const CONTENT_W: usize = 64;
 /// Content is kept in whole columns of this width in every bin, in bin pixels.
 pub const CONTENT_BIN_W: usize = 32;
-/// A result is made anew after this number of frames at most.
+/// A result is recomputed after this number of frames at most.
 const MAX_AGE: usize = 128;
-/// Rows made anew together because of their age, in pixels: the filters read rows around them, which they share.
+/// Rows recomputed together because of their age, in pixels: the filters read rows around them, which they share.
 const RENEWED_H: usize = 64;
-/// If more than this fraction of the units changes, all are made anew.
+/// If more than this fraction of the units changes, all are recomputed.
 const MAX_CHANGED: f32 = 0.85;
 /// If everything changes in several frames in turn, up to this number of frames are not tested, so that a moving camera
 /// pays next to nothing.
 const MAX_UNTESTED: u32 = 7;
 
-/// The parts of a picture that must be made anew, in units of one size.
+/// The parts of a picture that must be recomputed, in units of one size.
 #[derive(Clone, Debug, Default)]
 pub struct Units {
     /// Row by row.
@@ -59,7 +59,7 @@ impl Units {
         self.width_px
     }
 
-    /// Whether any unit of these columns and rows, in pixels, must be made anew.
+    /// Whether any unit of these columns and rows, in pixels, must be recomputed.
     #[inline(always)]
     pub fn any_changed(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
         let columns = columns.start / self.width_px..columns.end.div_ceil(self.width_px).min(self.across);
@@ -119,7 +119,7 @@ impl ChangeDetector {
         }
     }
 
-    /// Forgets every result: the next frame is made anew.
+    /// Forgets every result: the next frame is recomputed.
     pub fn clear(&mut self) {
         (self.generation, self.untested) = (None, [0; 2]);
     }
@@ -129,19 +129,19 @@ impl ChangeDetector {
         self.generation.is_some()
     }
 
-    /// Whether the next frame must be surveyed; otherwise it is made anew without ([`Self::skip`]).
+    /// Whether the next frame must be surveyed; otherwise it is recomputed without ([`Self::skip`]).
     pub fn needs_survey(&self) -> bool {
         self.untested[0] == 0
     }
 
-    /// Counts a frame that is made anew without a survey.
+    /// Counts a frame that is recomputed without a survey.
     pub fn skip(&mut self) {
         self.untested[0] -= 1;
         self.generation = None;
     }
 
-    /// Finds what must be made anew, after the frame was surveyed; `is_beside_fresh` tells whether content that is never
-    /// kept is in or beside some columns and rows with other content. Returns false if everything is made anew.
+    /// Finds what must be recomputed, after the frame was surveyed; `is_beside_fresh` tells whether content that is never
+    /// kept is in or beside some columns and rows with other content. Returns false if everything is recomputed.
     pub fn detect(&mut self, plan: &Plan, is_beside_fresh: impl Fn(Range<usize>, Range<usize>) -> bool) -> bool {
         let kept = || plan.bins.iter().filter(|bin| bin.is_kept());
         let least_px = kept().map(|bin| bin.min_radius_px).fold(f32::INFINITY, f32::min);
@@ -187,12 +187,12 @@ impl ChangeDetector {
         if self.frame.is_multiple_of(period) { first..(first + RENEWED_H).min(height) } else { 0..0 }
     }
 
-    /// Returns the content that must be made anew, if [`Self::detect`] returned true.
+    /// Returns the content that must be recomputed, if [`Self::detect`] returned true.
     pub fn content(&self) -> &Units {
         &self.content
     }
 
-    /// Returns the results that must be made anew, if [`Self::detect`] returned true.
+    /// Returns the results that must be recomputed, if [`Self::detect`] returned true.
     pub fn results(&self) -> &Units {
         &self.results
     }

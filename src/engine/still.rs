@@ -51,7 +51,7 @@ pub fn compute_coc_and_depth(
     prepare(look, color, depth, threads).map(|(coc, depth, _)| (coc, depth))
 }
 
-/// The CoC and depth of a picture, and what is kept of it before a transparent background.
+/// The CoC and depth of a picture, and its foreground mask for a transparent background.
 type Prepared = (CocField, Option<DepthMap>, Option<Pooled<Images>>);
 
 /// Does the same as [`compute_coc_and_depth`] for any background.
@@ -91,7 +91,7 @@ pub fn blur_picture(
 
 /// Does the same as [`blur_picture`], for transparent backgrounds, too, and for 16-bit `codes`, of which `color` shows
 /// the same light as 8-bit sRGB ([`Picture16::to_srgb`]). These are blurred on the CPU, in linear light of their tone
-/// curves; before a transparent background, what is blurred gets 8 bits.
+/// curves; with a transparent background, blurred pixels get 8 bits.
 ///
 /// # Errors
 /// The blur follows depth and none is given, it is too wide for the picture, or the requested GPU does not exist.

@@ -131,7 +131,7 @@ impl From<RecordingError> for CliError {
 }
 
 impl CliError {
-    /// Does a part of a command. A panic becomes an error, so that what is whole can still be finished.
+    /// Does a part of a command. A panic becomes an error, so that complete outputs can still be finished.
     pub fn catch_panic<T>(work: impl FnOnce() -> Result<T, Self>) -> Result<T, Self> {
         let done = catch_unwind(AssertUnwindSafe(work));
         done.unwrap_or_else(|panic| Err(Self::Panic(panic_message(&*panic).to_owned())))

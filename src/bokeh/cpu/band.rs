@@ -48,7 +48,7 @@ pub enum Inpainting<'a> {
 /// What the bins keep from earlier frames.
 #[derive(Clone, Copy)]
 pub struct Kept<'a> {
-    /// The content that must be made anew.
+    /// The content that must be recomputed.
     pub content: &'a Units,
     /// The bins that may be kept.
     pub bins: [bool; MAX_BINS],

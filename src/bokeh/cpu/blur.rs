@@ -31,7 +31,7 @@ pub struct Strip<'a> {
     pub source: &'a Strips,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
-    /// What must be made anew; `None` is everything.
+    /// What must be recomputed; `None` is everything.
     pub units: Option<&'a Units>,
     /// Rows of the picture whose result is wanted.
     pub wanted_px: Range<usize>,

@@ -51,7 +51,7 @@ impl HeldRows<'_> {
 
 /// A row of tiles of [`Held`].
 pub struct HeldRow<'a> {
-    /// What must be made anew; `None` is everything.
+    /// What must be recomputed; `None` is everything.
     pub units: Option<&'a Units>,
     pub picture: &'a mut [u8],
     pub is_complete: &'a mut [bool],

@@ -40,7 +40,7 @@ pub struct CutOut {
 }
 
 impl CutOut {
-    /// Divides the colours of a picture that was blurred over black by what is kept of them
+    /// Divides the colours of a picture that was blurred over black by its foreground mask
     /// ([`VirtualBackground::draw_kept`], blurred in the same way), and sets alpha. Transparent pixels become black.
     pub fn unpremultiply(&mut self, color: &mut ColorImage, kept: &ColorImage) {
         let Self { light, alpha } = self;

@@ -1,8 +1,7 @@
 //! Tracks the surfaces in front of the remembered background.
 //!
 //! Behind the first surface that covers it, the background stays valid. If a second surface appears in front of the
-//! first, the first one is what lies behind it: the remembered background was not what was seen last, and is forgotten
-//! at once.
+//! first, the background behind it is the first one: the remembered one was not seen last, and is forgotten at once.
 
 use pulp::{Arch, WithSimd};
 

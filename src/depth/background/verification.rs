@@ -1,4 +1,4 @@
-//! Checks the remembered background against what is seen beside outlines.
+//! Checks the remembered background against the surfaces seen beside outlines.
 //!
 //! An object may be put behind a subject, or change there, so that only a part of it is visible, beside the subject's
 //! outline. If it differs from the remembered background, the background next to it is doubtful and is forgotten:

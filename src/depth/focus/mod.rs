@@ -65,8 +65,8 @@ const ACCEPTED: &str = "METRES above 0 (in relative depth a place from 0, the ne
                         width and height (0 to 1), or track:X,Y";
 
 impl FocusRule {
-    /// Returns the focus on what is at a distance of relative depth whose farthest point is at `farthest`; both in units of
-    /// the nearest.
+    /// Returns the focus at a distance of relative depth whose farthest point is at `farthest`; both in units of the
+    /// nearest.
     pub fn at_relative(distance: f32, farthest: f32) -> Self {
         let [depth, most] = [distance, farthest].map(|distance| 1.0 - DepthMap::metres_to_relative(distance));
         Self::Relative((depth / most.max(f32::EPSILON)).clamp(0.0, 1.0))

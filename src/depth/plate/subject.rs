@@ -136,7 +136,7 @@ impl Subject {
     }
 
     /// Labels each pixel by its largest difference from the plate with the exposure `gain`. `weak` and `strong` are the
-    /// thresholds; what was foreground in the previous frame stays it down to a fraction of them.
+    /// thresholds; foreground of the previous frame stays foreground down to a fraction of them (hysteresis).
     fn label_pixels(
         &mut self,
         now: &[[f32; 3]],

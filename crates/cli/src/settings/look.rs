@@ -16,7 +16,7 @@ pub struct RequestedLook {
 }
 
 impl RequestedLook {
-    /// Reads the look of the options; `given` says what of it comes from a preset.
+    /// Reads the look of the options; `given` says which settings come from a preset.
     ///
     /// # Errors
     /// See [`build_look`].

@@ -140,7 +140,7 @@ impl<'a> Stage<'a> {
         Ok(true)
     }
 
-    /// Blurs what is kept of a frame, while no frame is in flight; returns the time it took, in nanoseconds.
+    /// Blurs the foreground mask of a frame, while no frame is in flight; returns the time it took, in nanoseconds.
     fn blur_kept(&mut self, kept: &mut Images, coc: CocField) -> Result<u64, BokehError> {
         let began_ns = self.shared.clock.now_ns();
         self.blur.blur(kept, coc)?;
@@ -238,7 +238,7 @@ impl<'a> Stage<'a> {
         late.is_some_and(|late| late.is_late(frame.ticket.captured_ns, frame.since_ns, expected_ns))
     }
 
-    /// Records the times of a finished frame that was in flight for `in_flight_ns`, after `kept_ns` for what is kept of it;
+    /// Records the times of a finished frame that was in flight for `in_flight_ns`, after `kept_ns` for its mask;
     /// returns how long its blur took.
     fn record_times(&mut self, done: &Frame<()>, passes: &PassTimes, in_flight_ns: u64, kept_ns: u64) -> u64 {
         let mut in_passes_ns = 0;

@@ -30,7 +30,7 @@ pub(super) struct Stage<'a> {
     cropper: Cropper,
     /// The crop that goes out.
     cropped: ColorImage,
-    /// The crop of what is kept of the picture.
+    /// The crop of the picture's foreground mask.
     cropped_kept: ColorImage,
     cut_out: CutOut,
 }

@@ -23,7 +23,7 @@ impl Report {
         self.describe_slowness().into_iter().chain(lossy).fold(text, |text, line| text + "\n" + &line)
     }
 
-    /// Says how many frames a slow machine showed and what to do, if a tenth of those of a live source was lost.
+    /// Says how many frames a slow machine showed and what to do, if a live source lost a tenth of them.
     fn describe_slowness(&self) -> Option<String> {
         let FrameCounts { captured, dropped, .. } = &self.frames;
         let lost = dropped.driver + dropped.evicted + dropped.late;

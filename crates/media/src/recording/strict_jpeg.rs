@@ -1,4 +1,4 @@
-//! JPEG photos with all their pixels: the crate `image` would fill in what is missing, and say nothing.
+//! JPEG photos with all their pixels: the crate `image` would fill in missing ones, and say nothing.
 
 use std::io::{Cursor, ErrorKind};
 

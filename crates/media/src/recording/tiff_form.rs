@@ -1,4 +1,4 @@
-//! The form of the first picture in a TIFF file, to say in plain words what of it is not read.
+//! The form of the first picture in a TIFF file, to say in plain words which part of it is not supported.
 
 use std::fs::File;
 use std::io::{BufReader, Seek};

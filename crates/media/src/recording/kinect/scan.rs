@@ -1,6 +1,6 @@
 //! Finds tracks, tags, attachments and pictures in a Matroska file (RFC 9559), in one pass over its elements.
 //!
-//! The pass reads the heads of elements and skips what is in them: some hundred bytes per picture. It needs no index,
+//! The pass reads the heads of elements and skips their content: some hundred bytes per picture. It needs no index,
 //! and does not believe the length of the whole, which is written last, so that a file that was cut short, or whose
 //! recorder was killed, is read up to its last whole picture. The crate `matroska-demuxer` refuses such files, reads the bytes
 //! of every picture to list them, and no attachments.

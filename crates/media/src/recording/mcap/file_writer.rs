@@ -141,7 +141,7 @@ impl<W: Write> FileWriter<W> {
         self.stream.write_all(bytes)
     }
 
-    /// Writes what is left, and the summary.
+    /// Writes the rest, and the summary.
     ///
     /// # Errors
     /// The stream cannot be written.

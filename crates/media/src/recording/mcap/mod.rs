@@ -168,7 +168,7 @@ fn in_order(topic: &Topic, has_stamps: bool) -> Timed {
 }
 
 /// Pairs the pictures with the depth maps that were taken within half a frame. Returns the pictures in order, the frames
-/// (the position of a picture there, and that of the depth map in its topic), and the counts of what is left over.
+/// (the position of a picture there, and that of the depth map in its topic), and the counts of unpaired ones.
 fn pair_frames(color: &Topic, depth: Option<&Topic>) -> (Timed, Vec<(usize, Option<usize>)>, Unpaired) {
     // Some drivers leave the times at 0.
     let has_stamps =

@@ -1,7 +1,7 @@
 //! Finds the messages with pictures in a file, in one pass over its records.
 //!
 //! The pass needs no summary at the end of the file, so that a file that was cut short is read up to its last whole
-//! record. It skips what is in the messages: of a file without compression it reads some hundred bytes per picture.
+//! record. It skips the messages' content: in a file without compression it reads some hundred bytes per picture.
 //! Compressed chunks are decompressed, because only a message itself has the time at which its picture was taken. The crate
 //! `mcap` reads every message whole, ends at the first damage, and brings 15 packages.
 
