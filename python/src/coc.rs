@@ -21,7 +21,7 @@ pub fn coc_from_depth(
     let CocRule::Depth { lens, range_m, max_coc_px, .. } = errors::look(&settings)?.coc_rule(size) else {
         return Err(errors::value("the settings are for a blur without depth"));
     };
-    let CocField::Depth(lens) = lens.coc_field((focus_m, range_m), size.0, max_coc_px) else { return Ok(()) };
+    let CocField::Depth(lens) = lens.coc_field(focus_m, range_m, size.0, max_coc_px) else { return Ok(()) };
     let (depth, out) = (depth.as_slice()?, out.as_slice_mut()?);
     py.detach(|| out.iter_mut().zip(depth).for_each(|(coc_px, &metres)| *coc_px = lens.coc_px(metres)));
     Ok(())

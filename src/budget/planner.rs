@@ -95,8 +95,10 @@ impl Planner {
     /// # Panics
     /// The costs are empty, too many, not positive or not ascending.
     pub fn new(
-        (budget_ns, period_ns): (u64, Option<u64>),
-        (efforts, may_share): (&[f64], bool),
+        budget_ns: u64,
+        period_ns: Option<u64>,
+        efforts: &[f64],
+        may_share: bool,
         blur_costs: &[f64],
         [usual, start]: [usize; 2],
     ) -> Self {
@@ -137,7 +139,7 @@ impl Planner {
     /// Returns a planner for a blur with other levels. Their learnt times are discarded, those of depth are kept.
     pub fn with_blur(&self, blur_costs: &[f64], [usual, start]: [usize; 2]) -> Self {
         let mut planner =
-            Self::new((self.budget_ns, self.period_ns), (&self.efforts, self.may_share), blur_costs, [usual, start]);
+            Self::new(self.budget_ns, self.period_ns, &self.efforts, self.may_share, blur_costs, [usual, start]);
         let now = Plan { level: start, ..self.plan() };
         planner.governor = create_governor(&self.efforts, blur_costs, &planner.plans, now);
         planner.governor.copy_model(DEPTH_STAGE, &self.governor);

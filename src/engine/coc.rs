@@ -229,7 +229,7 @@ impl CocCalculator {
             CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
         };
         let focus_m = self.focus.focus_m(map, time_ns);
-        let field = lens.coc_field((focus_m, range_m), color.width, max_coc_px);
+        let field = lens.coc_field(focus_m, range_m, color.width, max_coc_px);
         // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
             match &mut self.postprocessor {

@@ -18,7 +18,7 @@ impl QualityPicker {
     pub(super) fn new((rule, finest): (QualityRule, Quality), time: TimeBudget) -> Self {
         let TimeBudget { budget_ns, period_ns, efforts, shares_depth } = time;
         let (levels, costs, indices) = Self::allowed_levels(rule, finest);
-        Self { levels, planner: Planner::new((budget_ns, period_ns), (efforts, shares_depth), costs, indices) }
+        Self { levels, planner: Planner::new(budget_ns, period_ns, efforts, shares_depth, costs, indices) }
     }
 
     /// Returns a picker for another rule and executor. Measured blur times are dropped, those of depth stay.

@@ -38,7 +38,7 @@ pub enum CocAtInfinity {
 impl CocAtInfinity {
     /// Returns the CoC as a function of depth, for a picture `width_px` wide, focused at `focus_m` metres with a sharp
     /// range of `range_m` around it.
-    pub fn coc_field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
+    pub fn coc_field(self, focus_m: f32, range_m: f32, width_px: u32, max_coc_px: f32) -> CocField {
         let coc_at_infinity_px = match self {
             Self::Px(radius_px) => radius_px,
             Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),
@@ -57,7 +57,7 @@ mod tests {
         let nearness = [1.0, 0.8, 0.5, 0.3, 0.125, 0.05];
         for focus in nearness {
             let focus_m = DepthMap::relative_to_metres(focus);
-            let CocField::Depth(coc) = CocAtInfinity::Relative(16.0).coc_field((focus_m, 0.0), 640, 100.0) else {
+            let CocField::Depth(coc) = CocAtInfinity::Relative(16.0).coc_field(focus_m, 0.0, 640, 100.0) else {
                 unreachable!("the rule is by depth")
             };
             for at in nearness {

@@ -43,7 +43,7 @@ pub fn warn_of_distances(look: &Look, size: (u32, u32), map: &DepthMap, from: De
     else {
         return;
     };
-    if let CocField::Depth(coc) = lens.coc_field((focus_m, range_m), size.0, max_coc_px)
+    if let CocField::Depth(coc) = lens.coc_field(focus_m, range_m, size.0, max_coc_px)
         && let Some(why) = describe_out_of_focus(&coc, map)
     {
         let scale = if in_units { "; is --depth-scale right for this depth?" } else { "" };

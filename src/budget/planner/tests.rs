@@ -8,7 +8,7 @@ const EFFORT_COSTS: [f64; 2] = [0.5, 1.0];
 const BALANCED: usize = 2;
 
 fn planner(efforts: &[f64]) -> Planner {
-    Planner::new((PERIOD_NS, Some(PERIOD_NS)), (efforts, true), &LEVEL_COSTS, [BALANCED, BALANCED])
+    Planner::new(PERIOD_NS, Some(PERIOD_NS), efforts, true, &LEVEL_COSTS, [BALANCED, BALANCED])
 }
 
 /// Simulates frames whose depth at full effort and usual blur take these times in milliseconds. Returns the plans.
@@ -108,7 +108,7 @@ fn all_the_time_there_is_is_taken_and_no_more() {
 
 #[test]
 fn without_a_pace_depth_is_as_good_as_it_gets() {
-    let mut planner = Planner::new((PERIOD_NS, None), (&EFFORT_COSTS, true), &LEVEL_COSTS, [BALANCED, BALANCED]);
+    let mut planner = Planner::new(PERIOD_NS, None, &EFFORT_COSTS, true, &LEVEL_COSTS, [BALANCED, BALANCED]);
     let plans = play(&mut planner, (500.0, 60.0), 100);
     assert!(plans.iter().all(|plan| plan.frames == 1 && plan.effort == 1));
     assert_eq!(plans[99].level, 0);
@@ -116,7 +116,7 @@ fn without_a_pace_depth_is_as_good_as_it_gets() {
 
 #[test]
 fn a_gpu_takes_a_finer_blur_while_depth_is_shared() {
-    let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], true), &[0.7, 1.0, 2.0], [1, 1]);
+    let mut planner = Planner::new(PERIOD_NS, Some(PERIOD_NS), &[1.0], true, &[0.7, 1.0, 2.0], [1, 1]);
     let plan = play(&mut planner, (45.0, 3.0), 300)[299];
     assert_eq!((plan.frames, plan.level), (2, 2));
 }
@@ -169,7 +169,7 @@ fn spikes_of_depth_do_not_lower_a_blur_that_has_time() {
     for (shares, efforts) in [(false, &[1.0][..]), (true, &[1.0]), (true, &EFFORT_COSTS)] {
         for spike_ms in [20, 40, 60, 90] {
             let start = [BALANCED, BALANCED];
-            let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (efforts, shares), &LEVEL_COSTS, start);
+            let mut planner = Planner::new(PERIOD_NS, Some(PERIOD_NS), efforts, shares, &LEVEL_COSTS, start);
             let [usual, shared] = play_with_spikes(&mut planner, (20, spike_ms, 11.0));
             assert!(usual > 0.9, "{shares} {efforts:?} {spike_ms}: the usual blur for {usual:.2} of the frames");
             assert!(shares || shared == 0.0);
@@ -182,7 +182,7 @@ fn spikes_of_depth_do_not_lower_a_blur_that_has_time() {
 fn depth_that_may_not_be_shared_never_is_and_the_blur_gives_way_first() {
     for (depth_ms, level) in [(20.0, BALANCED), (26.0, BALANCED), (31.0, 1), (60.0, BALANCED), (200.0, BALANCED)] {
         let start = [BALANCED, BALANCED];
-        let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), (&[1.0], false), &LEVEL_COSTS, start);
+        let mut planner = Planner::new(PERIOD_NS, Some(PERIOD_NS), &[1.0], false, &LEVEL_COSTS, start);
         let plans = play(&mut planner, (depth_ms, 9.0), 600);
         assert!(plans.iter().all(|plan| plan.frames == 1), "{depth_ms} ms");
         assert_eq!(plans[599].level, level, "{depth_ms} ms");

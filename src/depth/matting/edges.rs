@@ -44,7 +44,8 @@ impl EdgeDetector {
         (arch, workers): (Arch, &mut ThreadPool),
         map: &DepthMap,
         depth_step: f32,
-        (at_edge, edges): (&mut Bitmap, &mut Vec<EdgePixel>),
+        at_edge: &mut Bitmap,
+        edges: &mut Vec<EdgePixel>,
     ) {
         let (width, height) = (map.width as usize, map.height as usize);
         at_edge.resize((width, height));

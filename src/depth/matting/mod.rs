@@ -215,7 +215,7 @@ impl Matting {
         let arch = *arch;
         let size = (map.width as usize, map.height as usize);
         let fits = |depth_step: &f32| {
-            edge_detector.find_edges((arch, workers), map, *depth_step, (at_edge, edges));
+            edge_detector.find_edges((arch, workers), map, *depth_step, at_edge, edges);
             edges.len() <= most
         };
         // Only noise has more edges than `most`: then the largest steps are what counts.

@@ -118,7 +118,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     let size = color.size();
     let field = match look.coc_rule(size) {
         CocRule::Fixed(field) => field,
-        CocRule::Depth { lens, range_m, max_coc_px, .. } => lens.coc_field((focus_m, range_m), size.0, max_coc_px),
+        CocRule::Depth { lens, range_m, max_coc_px, .. } => lens.coc_field(focus_m, range_m, size.0, max_coc_px),
     };
     let mut map = map.clone();
     if let CocField::Depth(lens) = &field {

@@ -37,7 +37,7 @@ fn the_effect_follows_what_the_source_has() {
 fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
     let rule = |flags: &[&str]| resolve(flags, true).unwrap().coc_rule(SIZE);
     let depth = |flags: &[&str]| match rule(flags) {
-        CocRule::Depth { lens, max_coc_px, .. } => match lens.coc_field((2.0, 0.0), SIZE.0, max_coc_px) {
+        CocRule::Depth { lens, max_coc_px, .. } => match lens.coc_field(2.0, 0.0, SIZE.0, max_coc_px) {
             CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
             other => panic!("{other:?}"),
         },
@@ -82,7 +82,7 @@ fn tilt_shift_is_sharp_in_its_band_and_strongest_in_the_farthest_corner() {
 #[test]
 fn the_range_of_focus_reaches_the_lens() {
     let field = |flags: &[&str]| match resolve(flags, true).unwrap().coc_rule(SIZE) {
-        CocRule::Depth { lens, range_m, max_coc_px, .. } => match lens.coc_field((2.0, range_m), SIZE.0, max_coc_px) {
+        CocRule::Depth { lens, range_m, max_coc_px, .. } => match lens.coc_field(2.0, range_m, SIZE.0, max_coc_px) {
             CocField::Depth(depth) => depth,
             other => panic!("{other:?}"),
         },
