@@ -182,7 +182,7 @@ mod tests {
             let Some(Job { ticket, color, depth, mut out, .. }) = self.jobs.pop_front() else { return Ok(None) };
             out.rgb.fill(self.mark);
             let picture = Picture::from_memory(out);
-            Ok(Some(BlurredFrame { ticket, picture, color, depth, times: PassTimes::new(), reused: 0.0 }))
+            Ok(Some(BlurredFrame { ticket, picture, color, depth, times: PassTimes::new() }))
         }
 
         fn reclaim_job(&mut self) -> Option<Job> {

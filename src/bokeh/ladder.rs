@@ -5,7 +5,9 @@ mod factors;
 
 use std::sync::Arc;
 
+use super::aperture::Shape;
 use super::bank::FilterBank;
+use super::disc::{DiscBank, MAX_HALF_WIDTH};
 use super::quality_level::{MAX_FULL_RADIUS_PX, QUALITY_LEVELS, QualityLevel, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
@@ -38,6 +40,8 @@ pub struct QualityLadder {
     levels: Vec<LadderLevel>,
     /// Filter banks, in bin pixels; levels share equal banks.
     pub banks: Vec<Arc<FilterBank>>,
+    /// The aperture as discs, if it is one and its number of terms was not chosen; in bin pixels.
+    pub discs: Option<DiscBank>,
 }
 
 impl QualityLadder {
@@ -49,6 +53,7 @@ impl QualityLadder {
         let mut bank_keys: Vec<(Rank, f32)> = Vec::new();
         let mut banks = Vec::new();
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
+        let mut disc_px = 0.0_f32;
         let levels = Quality::ALL.into_iter().filter(wanted).map(|quality| {
             let level = QUALITY_LEVELS[quality as usize];
             let terms = if settings.coc == CocKind::Uniform { level.uniform_rank } else { level.rank };
@@ -66,9 +71,14 @@ impl QualityLadder {
                 banks.push(Arc::new(FilterBank::from_decomposition(&factors.svd, &factors.mask, rank, bank_px)));
                 banks.len() - 1
             });
+            disc_px = disc_px.max(bank_px);
             LadderLevel { quality, level, bank }
         });
-        Self { levels: levels.collect(), banks }
+        let levels = levels.collect();
+        let is_disc = settings.aperture.shape == Shape::Disc && settings.aperture.intensity == 0.0;
+        let discs = (is_disc && settings.rank.is_none()).then(|| DiscBank::new(settings.rim, disc_px));
+        let discs = discs.filter(|discs| discs.max_half_width() <= MAX_HALF_WIDTH);
+        Self { levels, banks, discs }
     }
 
     /// Returns the level of a quality, or the nearest one.

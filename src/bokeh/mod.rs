@@ -10,6 +10,8 @@ pub mod bank;
 pub mod bin_weight;
 #[doc(hidden)]
 pub mod cpu;
+#[doc(hidden)]
+pub mod disc;
 mod error;
 #[doc(hidden)]
 pub mod fallback;
@@ -26,8 +28,6 @@ mod picture;
 pub mod plan;
 #[doc(hidden)]
 pub mod quality_level;
-#[doc(hidden)]
-pub mod reuse;
 pub mod slices;
 #[doc(hidden)]
 pub mod split;
@@ -106,8 +106,8 @@ pub struct Settings {
     /// True if each frame may choose its own quality level ([`Job::quality`]): the executor then allocates for all
     /// levels.
     pub adaptive: bool,
-    /// Whether parts of a result that hardly change may be kept from earlier frames. The frames must then be those of
-    /// one stream, in order.
+    /// Whether what is behind is steadied: noise is averaged over frames. These must then be those of one stream, in
+    /// order.
     pub reuse: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
@@ -160,8 +160,6 @@ pub struct BlurredFrame {
     pub depth: Option<Pooled<DepthMap>>,
     /// Time per pass.
     pub times: PassTimes,
-    /// Fraction of the picture that was kept from earlier frames ([`Settings::reuse`]), 0 to 1.
-    pub reused: f32,
 }
 
 /// Selects an intermediate result of the last frame, read as vectors of four values.

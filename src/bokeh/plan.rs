@@ -21,8 +21,9 @@ use band::BandRows;
 
 use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
+use super::disc::{self, DiscBank};
 use super::ladder::{Compositing, QualityLadder};
-use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, compensated_radius_px, scale_within};
+use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, compensated_radius_px, scale_within};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -51,9 +52,11 @@ pub const UNBOUNDED_COLOR: f32 = 1e20;
 /// finds content.
 pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
-/// The result of a bin whose content has at least this radius, in pixels, may be reused; below, it follows details that
-/// the means of tiles do not show.
+/// The bins stay the same from frame to frame if content of at least this radius, in pixels, still fits them.
 const MIN_KEPT_RADIUS_PX: f32 = 5.0;
+/// Up to this fraction of the picture may be blurred by more than [`SHARP_PX`](super::split::SHARP_PX) in a bin in focus
+/// that is shown as it is.
+const MAX_DEFOCUSED_FRACTION: f32 = 0.0005;
 
 /// A range of signed CoC, with the scale of its picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,11 +83,6 @@ impl Bin {
     /// Returns the standard deviation, in cells, of the neighbourhood over which a local radius is averaged.
     pub fn sigma_cells(&self) -> f32 {
         (self.max_radius_px / (2.0 * CELL as f32)).max(0.5)
-    }
-
-    /// Whether its result may be reused. Near objects move most, and are few.
-    pub fn is_kept(&self) -> bool {
-        !self.near && self.min_radius_px >= MIN_KEPT_RADIUS_PX
     }
 }
 
@@ -121,6 +119,8 @@ pub struct Plan {
     full_scale: bool,
     /// Largest radius in the bin in focus, in pixels.
     focus_px: f32,
+    /// Whether hardly any of the content in focus has a radius that shows.
+    is_focus_sharp: bool,
     /// Largest CoC radius behind and in front of the focal plane, in pixels.
     max_px: [f32; 2],
     histogram: CocHistogram,
@@ -160,6 +160,7 @@ impl Plan {
             coc: settings.coc,
             full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
+            is_focus_sharp: false,
             max_px: [settings.far_max_px, settings.near_max_px],
             histogram: CocHistogram::default(),
             ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
@@ -190,6 +191,7 @@ impl Plan {
         far.clear();
         near.clear();
         self.focus_px = far_px.max(near_px);
+        self.is_focus_sharp = false;
         match self.coc {
             CocKind::Ramp => {
                 far.extend(geometric_ranges(far_px, self.level.bins_per_side));
@@ -240,6 +242,9 @@ impl Plan {
         }
         self.focus_px = sides[0].max(sides[1]).min(self.max_px[0].max(self.max_px[1]));
         self.create_bins();
+        let focus = self.bins.iter().find(|bin| bin.slot == 0);
+        self.is_focus_sharp = focus
+            .is_some_and(|bin| self.histogram.defocused_fraction(bin.low_px, bin.high_px) <= MAX_DEFOCUSED_FRACTION);
     }
 
     /// Makes the bins of the current ranges, front to back. The slot of a bin depends only on its place: 0 in focus,
@@ -285,9 +290,28 @@ impl Plan {
         }
     }
 
-    /// Returns which bins' results may be kept from frame to frame.
-    pub fn kept_bins(&self) -> [bool; MAX_BINS] {
-        std::array::from_fn(|k| self.bins.get(k).is_some_and(Bin::is_kept))
+    /// Returns the aperture as discs, if a bin may be summed instead of filtered: if all its radii are large enough.
+    pub fn discs(&self, bin: &Bin) -> Option<&DiscBank> {
+        let min_px = compensated_radius_px(bin.min_radius_px, bin.scale);
+        self.ladder.discs.as_ref().filter(|_| min_px >= disc::MIN_RADIUS_PX && self.compositing != Compositing::Gather)
+    }
+
+    /// Returns the index of the bin in focus, if none of its content is blurred visibly, nor hidden by something in
+    /// front: it is shown as it is.
+    pub fn sharp_bin(&self) -> Option<usize> {
+        self.bins.first().filter(|bin| bin.slot == 0 && self.is_focus_sharp).map(|_| 0)
+    }
+
+    /// Whether a bin's content is steadied in time: detail that a smaller blur lets through would lag behind, and near
+    /// objects move most.
+    pub fn is_steadied(&self, bin: &Bin) -> bool {
+        self.reuse && !bin.near && bin.scale > 1 && bin.min_radius_px >= MIN_KEPT_RADIUS_PX
+    }
+
+    /// Returns the rows of a band of the pass `bin`: whole rows of cells of every bin.
+    pub fn band_rows(&self) -> usize {
+        let coarsest = self.bins.iter().map(|bin| bin.scale).max().unwrap_or(1);
+        CELL * coarsest.max(SCALES[2])
     }
 
     /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a

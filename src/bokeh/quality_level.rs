@@ -1,5 +1,6 @@
 //! The quality levels of the blur, with their cost and parameters.
 
+use super::disc::MIN_RADIUS_PX;
 use crate::budget::Quality;
 
 /// Scales of a bin: pixels of the picture per bin pixel and axis.
@@ -33,8 +34,6 @@ pub struct QualityLevel {
     pub max_bin_radius_px: f32,
     /// Separable terms for a uniform radius: more, because missing terms would be visible at every pixel.
     pub uniform_rank: u32,
-    /// Largest radius in bin pixels for a uniform radius: the picture is reduced until it fits.
-    pub uniform_radius_px: f32,
 }
 
 /// Quality levels, cheapest first, in the order of [`Quality::ALL`].
@@ -45,13 +44,12 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
         bins_per_side: 2,
         near_from_px: 2.5,
         near_from_fraction: 0.07,
-        scale_from_px: [0.0, 3.0, 8.0, 20.0],
+        scale_from_px: [0.0, 3.0, 17.0, 34.0],
         max_bin_radius_px: 14.0,
         uniform_rank: 3,
-        uniform_radius_px: 9.0,
     };
     [
-        QualityLevel { cost: 0.68, uniform_rank: 2, uniform_radius_px: 6.0, ..fast },
+        QualityLevel { cost: 0.68, uniform_rank: 2, ..fast },
         fast,
         QualityLevel {
             cost: 1.0,
@@ -60,7 +58,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
             near_from_px: 2.0,
             scale_from_px: [0.0, 3.5, 18.0, 40.0],
             uniform_rank: 4,
-            uniform_radius_px: 36.0,
             ..fast
         },
         QualityLevel {
@@ -70,7 +67,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
             near_from_px: 1.5,
             scale_from_px: [0.0, 5.0, 20.0, 48.0],
             uniform_rank: 4,
-            uniform_radius_px: 48.0,
             ..fast
         },
         QualityLevel {
@@ -82,7 +78,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
             scale_from_px: [0.0, 16.0, 48.0, 96.0],
             max_bin_radius_px: 28.0,
             uniform_rank: 6,
-            uniform_radius_px: 96.0,
         },
     ]
 };
@@ -116,9 +111,11 @@ impl QualityLevel {
         fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, self.max_bin_radius_px))
     }
 
-    /// Returns the scale for a uniform radius.
+    /// Returns the scale for a uniform radius, which shows in every pixel: one at which its disc is round.
     pub fn uniform_scale(&self, radius_px: f32) -> usize {
-        scale_within(radius_px, self.uniform_radius_px)
+        let coarsest = self.scale(radius_px, radius_px);
+        let is_round = |scale: &usize| *scale <= coarsest && compensated_radius_px(radius_px, *scale) >= MIN_RADIUS_PX;
+        SCALES.into_iter().rev().find(is_round).unwrap_or(1)
     }
 }
 

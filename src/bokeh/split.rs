@@ -30,6 +30,9 @@ const LOW_TOLERANCE: f32 = 0.8;
 /// Fraction of the picture that may be below the latter.
 const MISFIT_FRACTION: f32 = 0.0005;
 
+/// Filters of a smaller radius have one tap, in pixels.
+pub const SHARP_PX: f32 = 0.4;
+
 /// A range of `|c|` on one side of the focal plane that contains pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CocRange {
@@ -46,13 +49,15 @@ pub struct CocRange {
 pub struct CocHistogram {
     /// Samples per bucket of `|c|`, behind and in front of the focal plane; pixels in focus are in no bucket.
     sides: [[u32; BUCKETS]; 2],
+    /// Samples with a radius from [`SHARP_PX`] to the first bucket.
+    soft: u32,
     /// Number of samples, including those in focus.
     samples: u32,
 }
 
 impl Default for CocHistogram {
     fn default() -> Self {
-        Self { sides: [[0; BUCKETS]; 2], samples: 0 }
+        Self { sides: [[0; BUCKETS]; 2], soft: 0, samples: 0 }
     }
 }
 
@@ -79,6 +84,7 @@ impl CocHistogram {
                 if bucket < 1 << 16 {
                     self.sides[usize::from(coc_px < 0.0)][(bucket as usize).min(BUCKETS - 1)] += 1;
                 }
+                self.soft += u32::from(coc_px.abs() > SHARP_PX && coc_px.abs() < FOCUS_BORDER_PX);
                 self.samples += 1;
             }
         }
@@ -127,6 +133,14 @@ impl CocHistogram {
         }
         ranges.reverse();
         ranges.first().map_or(FOCUS_BORDER_PX, |range| range.border_px)
+    }
+
+    /// Returns the fraction of the picture with a CoC between two borders around the focal plane that is not sharp.
+    pub fn defocused_fraction(&self, low_px: f32, high_px: f32) -> f32 {
+        let within = |near: bool, border_px: f32| -> u32 {
+            self.sides[usize::from(near)][..bucket_of(border_px.min(f32::MAX))].iter().sum()
+        };
+        (self.soft + within(false, high_px) + within(true, -low_px)) as f32 / self.samples.max(1) as f32
     }
 
     /// Returns prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture.

@@ -48,19 +48,19 @@ named! {
 }
 
 named! {
-    /// Whether a stream shows parts of the blurred background again that hardly change.
+    /// Whether a stream keeps what hardly changes: noise in the blurred background is averaged over time.
     pub enum Reuse default Auto {
-        /// Keeps them in real time
+        /// Keeps it in real time
         Auto = "auto",
-        /// Keeps them in every stream and sequence
+        /// Keeps it in every stream and sequence
         On = "on",
-        /// Blurs all of every frame
+        /// Makes every frame on its own
         Off = "off",
     }
 }
 
 impl Reuse {
-    /// Whether a stream keeps parts, in real time or not.
+    /// Whether a stream keeps what hardly changes, in real time or not.
     pub fn is_on(self, realtime: bool) -> bool {
         match self {
             Self::Auto => realtime,

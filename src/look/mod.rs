@@ -89,7 +89,7 @@ pub struct Look {
     pub highlights: f32,
     /// The quality level; `None` follows the time available.
     pub quality: Option<Quality>,
-    /// Whether a stream keeps parts of the result from earlier frames.
+    /// Whether a stream keeps what hardly changes from earlier frames.
     pub reuse: Reuse,
     /// Whether depth is relative ([`Look::for_source`]): then the strength is the radius for a difference of inverse depth
     /// from the nearest to the farthest point.

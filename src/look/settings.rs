@@ -145,7 +145,7 @@ settings! {
     /// Quality level: changes fidelity, never the amount of blur. In real time, auto is the best level for the
     /// available time (--budget-ms), up to balanced on the CPU and best on a GPU; otherwise it is balanced
     quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of list_choices_with_auto::<Quality>();
-    /// Whether a stream keeps parts of the blurred background that hardly change
+    /// Whether a stream keeps what hardly changes: noise behind is averaged over time
     reuse: Reuse = "reuse" "WHEN" Computing Reuse::from_str, one of list_choices::<Reuse>();
 }
 

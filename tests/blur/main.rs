@@ -14,7 +14,7 @@ mod laws;
 mod laws_random;
 mod occlusion;
 mod parity;
-mod reuse;
 mod shaders;
 mod shared_frame;
 mod slices;
+mod steady;

@@ -56,8 +56,6 @@ pub struct BlurTimings {
     pub quality_counts: QualityCounts,
     /// Frames whose blur took longer than the budget.
     pub misses: u64,
-    /// Sum over the blurred frames of the fraction of each that was kept from earlier ones.
-    pub reused: f64,
     /// The backend, `cpu`, `gpu`, `gpu, then cpu` or `none`, and the executor's description.
     pub by: [String; 2],
 }

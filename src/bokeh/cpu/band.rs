@@ -7,14 +7,13 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::bin::{BinRows, BinSums};
-use super::encode::CHUNK;
+use super::bin::{BinRows, BinSums, Row};
 use super::fill::{HalfPictureBand, InpaintedBackground};
+use super::rows::STRIP;
 use super::tent::{MARGIN, PADDED_BLOCK};
 use super::tiles::{BLOCK, Run, TILE_H, TILE_W, Tiles, extend_range};
 use super::unpack::{InputFrame, Surfaces};
 use crate::bokeh::plan::{BinWeight, CELL, MAX_BINS};
-use crate::bokeh::reuse::Units;
 
 /// A band of rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
@@ -26,8 +25,6 @@ pub struct Band<'a> {
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
     /// Treatment of pixels that near objects occlude.
     pub inpainting: Inpainting<'a>,
-    /// What is kept from the last frame; `None` is nothing.
-    pub kept: Option<Kept<'a>>,
     /// Per block, the first bin that waits for inpainting, or [`NO_BIN`].
     pub first_pending: &'a mut [usize],
     /// Scratch memory of the thread.
@@ -45,22 +42,13 @@ pub enum Inpainting<'a> {
     Done { first: usize, background: InpaintedBackground<'a> },
 }
 
-/// What the bins keep from earlier frames.
-#[derive(Clone, Copy)]
-pub struct Kept<'a> {
-    /// The content that must be recomputed.
-    pub content: &'a Units,
-    /// The bins that may be kept.
-    pub bins: [bool; MAX_BINS],
-}
-
-/// Which bins of a part of a block are made.
+/// What some columns of a band contribute to.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Making {
-    Nothing,
-    /// Those that are never kept.
-    Fresh,
-    All,
+enum Content {
+    /// One bin at a reduced scale, as a whole.
+    One(usize),
+    /// Any bins, by their weights.
+    Mixed,
 }
 
 /// A layer behind others: its first bin, and the weight of a pixel's own content in it.
@@ -99,9 +87,9 @@ impl WithSimd for Band<'_> {
 }
 
 impl Band<'_> {
-    /// Adds one block of columns to every bin that it contributes to, as far as they are not kept. In the first pass, a
-    /// block with occluded pixels does only the bins in front of the first layer that needs inpainting; the passes for
-    /// the layers behind ([`Inpainting::Done`]) do the others.
+    /// Adds one block of columns to every bin that it contributes to. In the first pass, a block with occluded pixels
+    /// does only the bins in front of the first layer that needs inpainting; the passes for the layers behind
+    /// ([`Inpainting::Done`]) do the others.
     #[inline(always)]
     fn process_block<V: Simd>(&mut self, simd: V, block: usize) {
         let columns = block_columns(block, self.source.size.0);
@@ -117,45 +105,38 @@ impl Band<'_> {
             Inpainting::Done { first, .. } if self.first_pending[block] > *first => return,
             Inpainting::Done { .. } => {}
         }
-        // Adjacent units that make the same bins are done together.
-        let step = self.kept.map_or(columns, |kept| kept.content.width_px());
+        // Adjacent columns of equal content are done together, in whole strips of every bin.
+        let coarsest = self.bins.iter().flatten().map(|bin| bin.scale).max().unwrap_or(1);
+        let step = STRIP * coarsest;
         let end = block * BLOCK + columns;
+        let last = end.min(self.source.size.0);
         let mut x0 = block * BLOCK;
-        while x0 < end {
-            let making = self.find_making(x0);
+        while x0 < last {
+            let content = self.content_of(block, x0..x0 + step);
             let mut next = x0 + step;
-            while next < end && self.find_making(next) == making {
+            while next < last && self.content_of(block, next..next + step) == content {
                 next += step;
             }
             let columns = next.min(end) - x0;
-            let is_whole = x0 == block * BLOCK && next >= end;
-            if making != Making::Nothing {
-                self.process_run(simd, Run { block, x0, columns, is_whole }, making);
-            }
+            let is_whole = x0 == block * BLOCK && next >= last;
+            self.process_run(simd, Run { block, x0, columns, is_whole }, content);
             x0 = next;
         }
     }
 
-    /// Returns which bins of the unit at column `x0` are made.
-    fn find_making(&self, x0: usize) -> Making {
-        let Some(kept) = self.kept else { return Making::All };
-        let columns = x0..x0 + kept.content.width_px();
-        if kept.content.any_changed(columns.clone(), self.rows.clone()) {
-            return Making::All;
+    /// Returns what some columns of a block contribute to.
+    fn content_of(&self, block: usize, columns: Range<usize>) -> Content {
+        let (tile_columns, tile_rows) = self.tiles_around(columns);
+        match self.tiles.only_bin(tile_columns, tile_rows) {
+            Some(k)
+                if k < self.first_pending[block]
+                    && !matches!(self.inpainting, Inpainting::Done { .. })
+                    && self.bins[k].as_ref().is_some_and(|bin| bin.scale > 1) =>
+            {
+                Content::One(k)
+            }
+            _ => Content::Mixed,
         }
-        let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
-        let has_fresh = self.bins.iter().zip(kept.bins).any(|(bin, is_kept)| {
-            let Some(bin) = bin.as_ref().filter(|_| !is_kept) else { return false };
-            // At full scale, no pixels of neighbours count; but the composite reads whole chunks.
-            let chunks = columns.start - columns.start % CHUNK..columns.end.next_multiple_of(CHUNK);
-            let (tile_columns, tile_rows) = match bin.scale {
-                1 => (chunks.start / TILE_W..chunks.end / TILE_W, self.rows.start / TILE_H..self.rows.end / TILE_H),
-                _ => self.tiles_around(chunks),
-            };
-            let overlaps = |weight| self.tiles.any_overlapping(weight, tile_columns, tile_rows);
-            is_filled || bin.weight.as_ref().is_none_or(overlaps)
-        });
-        if has_fresh { Making::Fresh } else { Making::Nothing }
     }
 
     /// Returns the columns and rows of tiles of some columns of the picture, and one more on every side, because the
@@ -170,23 +151,24 @@ impl Band<'_> {
     /// Returns which bins some columns of a block contribute to, and how many rows beyond the band these need; clears
     /// the other bins there.
     #[inline(always)]
-    fn find_active_bins(&mut self, run: Run, making: Making) -> ([bool; MAX_BINS], isize) {
+    fn find_active_bins(&mut self, run: Run, content: Content) -> ([bool; MAX_BINS], isize) {
         let Run { block, x0, columns, .. } = run;
         let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns.next_multiple_of(TILE_W));
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
-        let kept_bins = self.kept.filter(|_| making == Making::Fresh).map_or([false; MAX_BINS], |kept| kept.bins);
         let mut active = [false; MAX_BINS];
         let mut support = 0;
         for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            if !is_filled && k >= self.first_pending[block] || kept_bins[k] {
+            if !is_filled && k >= self.first_pending[block] {
                 continue;
             }
-            *active = is_filled
-                || bin
-                    .weight
-                    .as_ref()
-                    .is_none_or(|weight| self.tiles.any_overlapping(weight, tile_columns.clone(), tile_rows.clone()));
+            *active = match content {
+                Content::One(only) => k == only,
+                Content::Mixed => {
+                    let overlaps = |weight| self.tiles.any_overlapping(weight, tile_columns.clone(), tile_rows.clone());
+                    is_filled || bin.weight.as_ref().is_none_or(overlaps)
+                }
+            };
             match *active {
                 true => support = support.max(bin.scale as isize / 2),
                 false => bin.clear(run),
@@ -197,23 +179,30 @@ impl Band<'_> {
 
     /// Adds some columns of a block to the bins.
     #[inline(always)]
-    fn process_run<V: Simd>(&mut self, simd: V, run: Run, making: Making) {
+    fn process_run<V: Simd>(&mut self, simd: V, run: Run, content: Content) {
         let Run { x0, columns, .. } = run;
-        let (active, support) = self.find_active_bins(run, making);
+        let (active, support) = self.find_active_bins(run, content);
         let is_read = matches!(self.inpainting, Inpainting::Pending { .. });
         if !active.contains(&true) && !is_read {
             return;
         }
+        let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns);
+        let radius_px = self.tiles.only_coc(tile_columns, tile_rows);
         let mut surfaces: Surfaces<PADDED_BLOCK> = Surfaces::new();
-        let left = x0 as isize - MARGIN as isize;
+        let (left, padded) = (x0 as isize - MARGIN as isize, columns + 2 * MARGIN);
         let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - support..last + support {
             let inside = y.clamp(0, height - 1) as usize;
             let ahead = (y + PREFETCH_ROWS).clamp(0, height - 1) as usize;
-            self.source.prefetch(ahead, left, columns + 2 * MARGIN);
-            self.source.unpack::<V, PADDED_BLOCK>(inside, left, columns + 2 * MARGIN, &mut surfaces);
+            self.source.prefetch(ahead, left, padded);
+            match content {
+                Content::One(_) if radius_px.is_some() && !is_read => {
+                    self.source.unpack_light::<V, PADDED_BLOCK>(inside, left, padded, &mut surfaces.back);
+                }
+                _ => self.source.unpack::<V, PADDED_BLOCK>(inside, left, padded, &mut surfaces),
+            }
             match &mut self.inpainting {
                 Inpainting::NotNeeded => {}
                 Inpainting::Pending { halves, .. } => {
@@ -226,19 +215,26 @@ impl Band<'_> {
                     background.inpaint(simd, left, inside, width, &mut surfaces);
                 }
             }
-            let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-            extend_range(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
-            if surfaces.mixed {
-                extend_range(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
-            }
+            let row = match content {
+                Content::One(_) => Row::Whole(radius_px),
+                Content::Mixed => {
+                    let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+                    extend_range(&mut range, &surfaces.back.0[3][..padded], |coc_px| coc_px);
+                    if surfaces.mixed {
+                        extend_range(&mut range, &surfaces.front.0[3][..padded], |coc_px| coc_px);
+                    }
+                    Row::Weighted(range)
+                }
+            };
+            let at = (run, y - first);
             for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add_row::<V, 1>(simd, sums, run, first, y, &surfaces, range),
-                    2 => bin.add_row::<V, 2>(simd, sums, run, first, y, &surfaces, range),
-                    4 => bin.add_row::<V, 4>(simd, sums, run, first, y, &surfaces, range),
-                    _ => bin.add_row::<V, 8>(simd, sums, run, first, y, &surfaces, range),
+                    1 => bin.add_row::<V, 1>(simd, sums, at, &surfaces, row),
+                    2 => bin.add_row::<V, 2>(simd, sums, at, &surfaces, row),
+                    4 => bin.add_row::<V, 4>(simd, sums, at, &surfaces, row),
+                    _ => bin.add_row::<V, 8>(simd, sums, at, &surfaces, row),
                 }
             }
         }

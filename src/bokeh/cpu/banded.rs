@@ -74,11 +74,6 @@ impl BandedBokeh {
         self.whole.as_ref().map_or(self.threads, |whole| whole.workers.thread_count())
     }
 
-    /// Returns which fraction of the last frame was kept from earlier ones, 0 to 1.
-    pub(super) fn kept_fraction(&self) -> f32 {
-        self.whole.as_ref().map_or(0.0, CpuBokeh::kept_fraction)
-    }
-
     /// Changes the quality of the next frames, if the plan has other levels.
     pub(super) fn set_quality(&mut self, quality: Quality) {
         self.plan.set_quality(quality);

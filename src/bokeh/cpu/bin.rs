@@ -8,14 +8,25 @@ use pulp::Simd;
 
 use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
 use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
+use super::steady::steady;
 use super::tent::{
-    MARGIN, Means, PADDED_BLOCK, PLANE_LEN, SUM_PLANES, VectorWeight, accumulate_row, downscale_row, is_zero,
+    MARGIN, Means, PADDED_BLOCK, PLANE_LEN, SUM_PLANES, VectorWeight, accumulate_row, accumulate_whole_row,
+    downscale_row, is_zero,
 };
 use super::tiles::Run;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{BinWeight, CELL, MIN_COVERAGE};
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{load, prefetch, store};
+
+/// How the pixels of a row count in a bin.
+#[derive(Clone, Copy)]
+pub enum Row {
+    /// All as a whole; with their radius, in pixels, if it is the same for all. Only in bins at a reduced scale.
+    Whole(Option<f32>),
+    /// By their weights; with the range of their CoC, in pixels.
+    Weighted((f32, f32)),
+}
 
 /// Output of one bin for a band.
 pub struct BinRows<'a> {
@@ -27,6 +38,8 @@ pub struct BinRows<'a> {
     pub size: (usize, usize),
     /// Whether the range of its colours is needed.
     pub needs_color_range: bool,
+    /// Whether what changes little moves slowly from frame to frame.
+    pub is_steadied: bool,
     /// Rows of the bin in this band.
     pub rows: usize,
     /// Strips of the band, laid out like [`Strips`](super::rows::Strips).
@@ -124,25 +137,24 @@ impl BinRows<'_> {
         self.rows.div_ceil(CELL)
     }
 
-    /// Adds row `y` of the picture (may be outside it) to the bin rows of a band that begins at row `first`. `range` is
-    /// that of the CoC in the row, in pixels.
+    /// Adds row `y` of a band (may be outside it) to the bin rows that it contributes to: as a whole, or by its weights.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     pub fn add_row<V: Simd, const S: usize>(
         &mut self,
         simd: V,
         sums: &mut BinSums,
-        run: Run,
-        first: isize,
-        y: isize,
+        (run, y): (Run, isize),
         surfaces: &Surfaces<PADDED_BLOCK>,
-        range: (f32, f32),
+        row: Row,
     ) {
         let rows = self.rows as isize;
-        let overlaps = self.weight.is_none_or(|weight| weight.overlaps(range));
+        let overlaps = match row {
+            Row::Whole(_) => true,
+            Row::Weighted(range) => self.weight.is_none_or(|weight| weight.overlaps(range)),
+        };
         if S == 1 {
-            if (0..rows).contains(&(y - first)) {
-                let row = (run, (y - first) as usize);
+            if (0..rows).contains(&y) {
+                let row = (run, y as usize);
                 self.begin_cell_row(row, sums);
                 match overlaps {
                     true => self.store_full_scale_row(simd, row, sums, surfaces),
@@ -154,7 +166,7 @@ impl BinRows<'_> {
         }
         // For the bin row above, this is row `k + S` of its tent; for the row below, row `k`.
         let s = S as isize;
-        let from = y - first + s / 2;
+        let from = y + s / 2;
         let (lower, k) = (from.div_euclid(s), from.rem_euclid(s));
         let upper = lower - 1;
         if from < 0 || upper >= rows {
@@ -168,15 +180,22 @@ impl BinRows<'_> {
             let fresh = [!sums.touched[parity], !sums.touched[1 - parity]];
             sums.touched = [true; 2];
             let rise = (k as f32 + 0.5) / (S * S) as f32;
-            accumulate_row(
-                simd,
-                &VectorWeight::new(simd, &self.weight),
-                surfaces,
-                run.columns,
-                [1.0 / S as f32 - rise, rise],
-                [above, below],
-                fresh,
-            );
+            let weights = [1.0 / S as f32 - rise, rise];
+            match row {
+                Row::Whole(radius_px) => {
+                    // Colours, and radii unless they are all the same.
+                    for (p, sum) in
+                        [0, 1, 2, 3].into_iter().zip([0, 1, 2, 4]).take(3 + usize::from(radius_px.is_none()))
+                    {
+                        let (values, rows) = (&surfaces.back.0[p], [&mut above[sum], &mut below[sum]]);
+                        accumulate_whole_row(simd, values, run.columns, weights, rows, fresh);
+                    }
+                }
+                Row::Weighted(_) => {
+                    let weight = VectorWeight::new(simd, &self.weight);
+                    accumulate_row(simd, &weight, surfaces, run.columns, weights, [above, below], fresh);
+                }
+            }
         }
         if k == s - 1 {
             let touched = std::mem::take(&mut sums.touched[parity]);
@@ -184,18 +203,34 @@ impl BinRows<'_> {
                 sums.touched[1 - parity] = false;
             }
             if upper >= 0 {
-                let row = (run, upper as usize);
-                if touched {
-                    downscale_row::<V, S>(simd, above, run.columns, &mut sums.means);
-                }
-                self.begin_cell_row(row, sums);
-                match touched {
-                    true => self.store_row::<V, S>(simd, row, sums),
-                    false => self.clear_row::<S>(row, sums),
-                }
-                self.end_cell_row::<S>(row, sums);
+                self.finish_row::<V, S>(simd, sums, (run, upper as usize), touched.then_some(row));
             }
         }
+    }
+
+    /// Downscales and stores a bin row whose tent is complete, or clears it if it is empty.
+    #[inline(always)]
+    fn finish_row<V: Simd, const S: usize>(&mut self, simd: V, sums: &mut BinSums, at: (Run, usize), row: Option<Row>) {
+        self.begin_cell_row(at, sums);
+        if let Some(row) = row {
+            let above = &sums.rows.0[at.1 % 2];
+            for p in 0..SUM_PLANES {
+                let mean = &mut sums.means.0[p];
+                match (row, p) {
+                    (Row::Whole(_), 3) => mean.fill(1.0),
+                    (Row::Whole(Some(radius_px)), 4) => mean.fill(radius_px.abs()),
+                    _ => downscale_row::<V, S>(simd, &above[p], at.0.columns, mean),
+                }
+            }
+            if matches!(row, Row::Whole(None)) {
+                // A bin is on one side of the focal plane: all its CoC have the same sign.
+                sums.means.0[4].iter_mut().for_each(|radius_px| *radius_px = radius_px.abs());
+            }
+            self.store_row::<V, S>(simd, at, sums);
+        } else {
+            self.clear_row::<S>(at, sums);
+        }
+        self.end_cell_row::<S>(at, sums);
     }
 
     /// Starts a row of cells if this is its first row.
@@ -290,8 +325,14 @@ impl BinRows<'_> {
     #[inline(always)]
     fn store_row<V: Simd, const S: usize>(&mut self, simd: V, (run, row): (Run, usize), sums: &mut BinSums) {
         let (x0, width) = (run.x0 / S, run.columns / S);
-        let means = &sums.means.0;
+        let means = &mut sums.means.0;
         for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
+            if self.is_steadied {
+                let last = &self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
+                for k in (0..STRIP).step_by(V::F32_LANES) {
+                    steady(simd, (last, k, STRIP), &mut means[..4], x + k);
+                }
+            }
             let out = &mut self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
             for p in 0..4 {
                 out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);

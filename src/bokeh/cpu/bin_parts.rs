@@ -17,6 +17,7 @@ pub struct BinParts<'a> {
     scale: usize,
     size: (usize, usize),
     needs_color_range: bool,
+    is_steadied: bool,
     across: usize,
     /// Rows of the bin in a band.
     rows: usize,
@@ -40,6 +41,7 @@ impl<'a> BinParts<'a> {
             rows: bin_rows,
             weight: (plan.compositing == Compositing::Layers).then(|| plan.bin_weight(k)),
             needs_color_range: plan.has_overshoot(bin),
+            is_steadied: plan.is_steadied(bin),
             scale: bin.scale,
             size: (bin.width, bin.height),
         }
@@ -52,6 +54,7 @@ impl<'a> BinParts<'a> {
             scale: self.scale,
             size: self.size,
             needs_color_range: self.needs_color_range,
+            is_steadied: self.is_steadied,
             out: self.source.part(band),
             across: self.across,
             rows: self.rows.min(self.size.1 - band * self.rows),

@@ -12,13 +12,14 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
+use super::disc::DiscScratch;
 use super::filter::{
     BLOCK_ROWS, Taps, clamp_to_range, filter_column, filter_column_block, filter_row, max_row_len, row_len,
 };
 use super::rows::{COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips};
 use crate::bokeh::bank::FilterBank;
+use crate::bokeh::disc::DiscBank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
-use crate::bokeh::reuse::Units;
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::{load, prefetch, store};
 
@@ -31,8 +32,6 @@ pub struct Strip<'a> {
     pub source: &'a Strips,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
-    /// What must be recomputed; `None` is everything.
-    pub units: Option<&'a Units>,
     /// Rows of the picture whose result is wanted.
     pub wanted_px: Range<usize>,
     /// Pixels of the picture per bin pixel and axis.
@@ -42,6 +41,10 @@ pub struct Strip<'a> {
     /// Radius and range of colours, from `reach`.
     pub edges: &'a SegmentEdges,
     pub bank: &'a FilterBank,
+    /// The aperture as discs, if its bin is summed, and the largest light in it.
+    pub discs: Option<(&'a DiscBank, f32)>,
+    /// Largest radius of the bin, in bin pixels.
+    pub max_radius_px: f32,
     /// Whether the bin covers every pixel.
     pub whole: bool,
     /// Whether the aperture is rotated by 180 degrees (content in front of the focal plane).
@@ -69,10 +72,11 @@ pub struct Scratch {
     rows: Aligned,
     /// Rows of a strip with the filter support on both sides: `[BLOCK_ROWS][4][STRIP + 2 pad]`.
     lines: Aligned,
+    pub(super) discs: DiscScratch,
     /// Rows of cells that have content to filter.
-    filtered: Vec<bool>,
+    pub(super) filtered: Vec<bool>,
     /// Rows of cells whose result is made.
-    made: Vec<bool>,
+    pub(super) made: Vec<bool>,
 }
 
 impl Scratch {
@@ -82,6 +86,7 @@ impl Scratch {
         Self {
             rows: Aligned::zeros(ring_capacity(half_width) * max_row_len(TERMS_PER_GROUP.min(plan.ladder.max_terms()))),
             lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * half_width.next_multiple_of(COPY_WIDTH))),
+            discs: DiscScratch::new(plan.ladder.discs.as_ref().map_or(0, DiscBank::max_half_width)),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
             made: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -96,10 +101,11 @@ impl WithSimd for Strip<'_> {
             return;
         }
         // A whole bin has coverage 1 everywhere, which needs no filter.
-        if self.whole {
-            self.filter_groups::<S, 3>(simd);
-        } else {
-            self.filter_groups::<S, 4>(simd);
+        match (self.discs, self.whole) {
+            (Some(discs), true) => self.sum_discs::<S, 3>(simd, discs),
+            (Some(discs), false) => self.sum_discs::<S, 4>(simd, discs),
+            (None, true) => self.filter_groups::<S, 3>(simd),
+            (None, false) => self.filter_groups::<S, 4>(simd),
         }
     }
 }
@@ -134,14 +140,12 @@ impl Strip<'_> {
         let Scratch { filtered, made, .. } = &mut *self.scratch;
         filtered.clear();
         made.clear();
-        let columns_px = self.strip * STRIP * self.scale..(self.strip + 1) * STRIP * self.scale;
         let row_px = CELL * self.scale;
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
-            let rows_px = y * row_px..(y + 1) * row_px;
             // Between bin pixels the result is interpolated: a row of cells more is read on either side.
             let is_wanted = y * row_px < self.wanted_px.end + row_px && self.wanted_px.start < (y + 2) * row_px;
-            if !is_wanted || self.units.is_some_and(|units| !units.any_changed(columns_px.clone(), rows_px)) {
+            if !is_wanted {
                 made.push(false);
                 continue;
             }

@@ -72,8 +72,7 @@ impl Bokeh for BandedBokeh {
         out.resize(color.width, color.height);
         let radii = Radii::Field(&coc, depth.as_deref());
         let times = time_passes(|lap| self.blur_pixels(&color.rgb, radii, &mut out.rgb, lap));
-        let reused = self.kept_fraction();
-        self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times, reused });
+        self.done = Some(BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times });
         Ok(())
     }
 

@@ -9,6 +9,8 @@
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use super::encode::CHUNK;
@@ -101,19 +103,20 @@ impl Layers {
         Self { planes, ranges_px: [(0.0, 0.0); MAX_BINS], near: 0, count: 0, near_border_px: -1.0, near_slope: 1.0 }
     }
 
-    /// Composites the layers to linear light, at pixels with these CoC and with `proximity` from silhouettes. If the
+    /// Composites some `columns` of the layers to linear light, at pixels with these CoC and with `proximity` from silhouettes. If the
     /// pixels are `is_one_surface`, away from silhouettes, no CoC is needed.
     #[inline(always)]
     pub fn composite<S: Simd>(
         &self,
         simd: S,
+        columns: Range<usize>,
         proximity: &Option<Proximity>,
         coc_px: &[f32; CHUNK],
         is_one_surface: bool,
         color: &mut CacheAligned<[[f32; CHUNK]; 3]>,
     ) {
         let zero = simd.splat_f32s(0.0);
-        for x in (0..CHUNK).step_by(S::F32_LANES) {
+        for x in columns.step_by(S::F32_LANES) {
             let light = match proximity.as_ref().and_then(|proximity| proximity.interpolate(x, S::F32_LANES)) {
                 Some(squares) => self.composite_near_silhouettes(simd, &squares, load::<S>(coc_px, x), x),
                 None => self.composite_one_surface(simd, load::<S>(coc_px, x), is_one_surface, x),

@@ -8,12 +8,13 @@ mod blur;
 mod cell_sums;
 mod composite;
 mod directional;
+mod disc;
 mod encode;
+mod enlarge;
 mod fill;
 mod filter;
 mod frames;
 mod gather;
-mod held;
 mod layers;
 mod levels;
 mod marking;
@@ -23,7 +24,7 @@ mod probe;
 mod reach;
 mod rows;
 mod silhouettes;
-mod survey;
+mod steady;
 mod tent;
 mod tiles;
 mod unpack;
@@ -36,7 +37,6 @@ use band::{BandSums, NO_BIN};
 use blur::Scratch;
 use encode::{EncodeTable, Encoder};
 use gather::Gather;
-use held::Held;
 use pulp::Arch;
 use rows::Slot;
 use silhouettes::Silhouettes;
@@ -45,15 +45,11 @@ use unpack::InputFrame;
 
 use super::ladder::Compositing;
 use super::plan::{CELL, Plan};
-use super::reuse::CONTENT_BIN_W;
 use crate::budget::Quality;
 use crate::compute::thread_pool::{ThreadPool, core_count};
 
 pub use banded::{BandedBokeh, MAX_WHOLE_PIXELS};
 pub use pixels::{Pixels, Radii, Sample};
-
-// Content is kept in whole strips.
-const _: () = assert!(CONTENT_BIN_W == rows::STRIP);
 
 /// Runs a plan on the CPU, with buffers for the whole of it; [`BandedBokeh`] has one for the picture or for a band.
 pub struct CpuBokeh {
@@ -68,12 +64,9 @@ pub struct CpuBokeh {
     /// Per band and block, the first bin that waits for inpainting.
     first_pending: Vec<usize>,
     gather: Option<Gather>,
-    held: Option<Held>,
     thread_scratch: Vec<ThreadScratch>,
     /// Flags for [`DisjointParts`]: one per part of the largest pass.
     taken: Vec<AtomicBool>,
-    /// Fraction of the last frame that was kept from earlier ones.
-    kept_fraction: f32,
 }
 
 /// Scratch memory of one thread.
@@ -83,7 +76,6 @@ struct ThreadScratch {
     dilation: Vec<f32>,
     blur: Scratch,
     layers: layers::Layers,
-    survey: Vec<u32>,
 }
 
 impl CpuBokeh {
@@ -101,7 +93,6 @@ impl CpuBokeh {
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
                 layers: layers::Layers::new(),
-                survey: Vec::with_capacity(if plan.reuse { width * 3 } else { 0 }),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -117,9 +108,7 @@ impl CpuBokeh {
             workers,
             slots,
             gather,
-            held: Held::new(&plan),
             thread_scratch,
-            kept_fraction: 0.0,
             plan,
         }
     }
@@ -145,26 +134,15 @@ impl CpuBokeh {
         let frame = InputFrame::new(&self.plan, T::as_pixels(pixels, &encoder), coc);
         self.split_bins(&frame);
         lap("split")?;
-        // Where results are kept, the bins' buffers keep what they are made from.
-        let mut held = self.held.take();
-        let mut units = None;
-        if let Some(held) = &mut held {
-            if self.find_kept(&frame, held) {
-                units = Some((held.detector.content(), held.detector.results()));
-            }
-            lap("survey")?;
-        }
-        self.kept_fraction = units.map_or(0.0, |(_, results)| results.kept_fraction());
-        let (content, results) = units.unzip();
         // If something is in front, blocks where it occludes anything get the bins behind it after the inpainting.
-        self.compute_bins(&frame, None, content);
+        self.compute_bins(&frame, None);
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
                 pyramid.fill(&self.plan.visible_weight(layer.start), &self.silhouettes, &mut self.workers, self.arch);
             }
             lap("fill")?;
-            self.compute_bins(&frame, Some(layer), content);
+            self.compute_bins(&frame, Some(layer));
             lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
@@ -175,12 +153,10 @@ impl CpuBokeh {
         } else {
             self.dilate_radii();
             lap("reach")?;
-            self.blur_bins(results);
+            self.blur_bins(&frame);
             lap("blur")?;
         }
-        let kept = self.kept_fraction > 0.0;
-        self.composite(&frame, pixels, out, held.as_mut().and_then(|held| held.rows(kept)));
-        self.held = held;
+        self.composite(&frame, pixels, out);
         lap("composite")
     }
 }

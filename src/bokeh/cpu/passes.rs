@@ -3,13 +3,12 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::band::{Band, Inpainting, Kept, Layer};
+use super::band::{Band, Inpainting, Layer};
 use super::bin_parts::{BinParts, StripParts};
 use super::blur::Strip;
 use super::composite::Composite;
-use super::held::HeldRows;
 use super::marking::MarkSilhouettes;
-use super::pixels::Sample;
+use super::pixels::{Radii, Sample};
 use super::reach::DilateRadii;
 use super::tiles::{BLOCK, ComputeTileRanges, TILE_H};
 use super::unpack::InputFrame;
@@ -17,7 +16,6 @@ use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MAX_LAYERS;
 use crate::bokeh::plan::MAX_BINS;
-use crate::bokeh::reuse::{Units, content_size};
 use crate::compute::thread_pool::DisjointParts;
 
 impl CpuBokeh {
@@ -53,8 +51,12 @@ impl CpuBokeh {
                 },
             );
             self.silhouettes.dilate(&mut self.workers, arch);
+        } else if let Radii::Field(field, _) = frame.coc {
+            self.tiles.set_ranges(field);
         }
         self.tiles.classify(layered);
+        self.tiles.find_only_bins(&self.plan, frame.matte);
+        let sharp = self.plan.sharp_bin();
         // Near content may spread to any tile in focus, so bins are needed there as well.
         if self.plan.bins.iter().any(|bin| bin.near) {
             self.tiles.idle.fill(false);
@@ -66,21 +68,17 @@ impl CpuBokeh {
             let overlaps =
                 || self.tiles.any_overlapping(&self.plan.bin_weight(k), 0..self.tiles.across, 0..self.tiles.down);
             // Inpainted pixels may be in any bin behind.
-            slot.present = !layered || k >= in_front || overlaps();
+            // What is in focus is read from the picture.
+            slot.present = Some(k) != sharp && (!layered || k >= in_front || overlaps());
             slot.reshape(&self.plan, bin);
         }
     }
 
     /// Pass `bin`: all bins, or those of a `layer` in the blocks that waited for its inpainting.
-    pub(super) fn compute_bins(
-        &mut self,
-        frame: &InputFrame<'_>,
-        layer: Option<Range<usize>>,
-        content: Option<&Units>,
-    ) {
+    pub(super) fn compute_bins(&mut self, frame: &InputFrame<'_>, layer: Option<Range<usize>>) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
-        let (_, rows) = content_size(plan);
+        let rows = plan.band_rows();
         let mut bin_parts: [Option<BinParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in_slot(slot.index) else { continue };
@@ -98,7 +96,6 @@ impl CpuBokeh {
             (*layer, count) = (layer_from(range.start), count + 1);
         }
         let layers = &layers[..count];
-        let kept = content.map(|content| Kept { content, bins: plan.kept_bins() });
         let (halves, filled) = match (&mut self.pyramid, layer) {
             (Some(pyramid), Some(Range { start: first, .. })) => {
                 (None, Some((first, pyramid.background(&self.silhouettes, plan, first))))
@@ -122,7 +119,6 @@ impl CpuBokeh {
                     (band * rows < needed.end && needed.start < (band + 1) * rows).then(|| bin_part.part(band))
                 }),
                 inpainting,
-                kept,
                 first_pending: first_pending.part(band),
                 sums: &mut thread.sums,
             });
@@ -143,8 +139,8 @@ impl CpuBokeh {
     }
 
     /// Pass `blur`: each part is a strip. The strips of all bins are numbered consecutively, so that no thread idles.
-    pub(super) fn blur_bins(&mut self, units: Option<&Units>) {
-        let (plan, arch) = (&self.plan, self.arch);
+    pub(super) fn blur_bins(&mut self, frame: &InputFrame<'_>) {
+        let (plan, arch, max_light) = (&self.plan, self.arch, frame.max_light());
         let mut strip_parts: [Option<StripParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
@@ -163,18 +159,22 @@ impl CpuBokeh {
                 return;
             };
             let strip = part - strip_part.first;
+            let discs = plan.discs(bin).filter(|_| max_light.is_some());
+            let half_width =
+                discs.map_or_else(|| plan.bin_half_width(bin), |discs| discs.half_width(bin.max_radius_px));
             arch.dispatch(Strip {
                 source: strip_part.source,
                 size: (bin.width, bin.height),
-                units: units.filter(|_| bin.is_kept()),
                 wanted_px: plan.wanted_rows(),
                 scale: bin.scale,
                 cells: strip_part.cells,
                 edges: strip_part.edges,
                 bank: &plan.bank,
+                discs: discs.zip(max_light),
+                max_radius_px: bin.max_radius_px,
                 whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
-                half_width: plan.bin_half_width(bin),
+                half_width,
                 strip,
                 out: strip_part.out.part(strip),
                 active: strip_part.active.part(strip),
@@ -184,13 +184,7 @@ impl CpuBokeh {
     }
 
     /// Pass `composite`: each part is a row of tiles.
-    pub(super) fn composite<T: Sample>(
-        &mut self,
-        frame: &InputFrame<'_>,
-        pixels: &[T],
-        out: &mut [T],
-        held: Option<HeldRows<'_>>,
-    ) {
+    pub(super) fn composite<T: Sample>(&mut self, frame: &InputFrame<'_>, pixels: &[T], out: &mut [T]) {
         let width = self.plan.width;
         let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
@@ -205,7 +199,6 @@ impl CpuBokeh {
                     return;
                 }
                 let out = out.part(part);
-                let held = held.as_ref().map(|rows| rows.part(part));
                 arch.dispatch(Composite {
                     plan,
                     slots,
@@ -217,7 +210,6 @@ impl CpuBokeh {
                     encoder,
                     y0,
                     layers,
-                    held,
                     out,
                 });
             },

@@ -1,6 +1,6 @@
 //! Sample types of pictures in memory, and their circles of confusion.
 
-use super::encode::{CHUNK, Encoder};
+use super::encode::Encoder;
 use crate::bokeh::plan::Plan;
 use crate::color::ToneCurves;
 use crate::frame::DepthMap;
@@ -58,7 +58,7 @@ pub trait Sample: Default + Copy + Send + Sync {
     fn as_codes(samples: &mut [Self]) -> Option<&mut [u8]>;
 
     /// Writes a chunk of linear light as samples; `out` may be shorter.
-    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [Self]);
+    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [Self]);
 }
 
 impl Sample for u8 {
@@ -71,7 +71,7 @@ impl Sample for u8 {
     }
 
     #[inline(always)]
-    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [u8]) {
+    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [u8]) {
         encoder.table.encode(color, out);
     }
 }
@@ -86,7 +86,7 @@ impl Sample for u16 {
     }
 
     #[inline(always)]
-    fn write(color: &[[f32; CHUNK]; 3], encoder: &Encoder, out: &mut [u16]) {
+    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [u16]) {
         let curves = encoder.curves();
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             *pixel = std::array::from_fn(|channel| curves.0[channel].encode(color[channel][x]));
@@ -104,7 +104,7 @@ impl Sample for f32 {
     }
 
     #[inline(always)]
-    fn write(color: &[[f32; CHUNK]; 3], _: &Encoder, out: &mut [f32]) {
+    fn write(color: [&[f32]; 3], _: &Encoder, out: &mut [f32]) {
         // Next to very bright light, filters of few terms may sum to less than 0.
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             *pixel =

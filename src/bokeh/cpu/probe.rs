@@ -29,11 +29,6 @@ impl CpuBokeh {
         }
     }
 
-    /// Returns which fraction of the last frame was kept from earlier ones, 0 to 1.
-    pub fn kept_fraction(&self) -> f32 {
-        self.kept_fraction
-    }
-
     /// Whether bin `k` had any content in the last frame; if not, its passes were skipped.
     pub fn is_present(&self, k: usize) -> bool {
         self.slots[self.plan.bins[k].slot].present

@@ -63,6 +63,29 @@ pub fn accumulate_row<S: Simd>(
     }
 }
 
+/// Adds a row of one plane that counts as a whole, in the same way.
+#[inline(always)]
+pub fn accumulate_whole_row<S: Simd>(
+    simd: S,
+    values: &[f32; PADDED_BLOCK],
+    columns: usize,
+    weights: [f32; 2],
+    [above, below]: [&mut [f32; PADDED_BLOCK]; 2],
+    fresh: [bool; 2],
+) {
+    let weights = weights.map(|weight| simd.splat_f32s(weight));
+    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
+        let value = load::<S>(values, x);
+        for (row, (weight, fresh)) in [&mut *above, &mut *below].into_iter().zip(weights.into_iter().zip(fresh)) {
+            let weighted = match fresh {
+                true => simd.mul_f32s(value, weight),
+                false => fma(simd, value, weight, load::<S>(row, x)),
+            };
+            store::<S>(row, x, weighted);
+        }
+    }
+}
+
 /// Weight of a bin, prepared for vectors.
 pub struct VectorWeight<S: Simd> {
     steps: Option<[[S::f32s; 2]; 2]>,
@@ -79,7 +102,7 @@ impl<S: Simd> VectorWeight<S> {
     /// Returns the weights of a vector of pixels: of their only or farther surface, and of the nearer one where some
     /// have two.
     #[inline(always)]
-    pub fn surface_weights(&self, simd: S, surfaces: &Surfaces<PADDED_BLOCK>, x: usize) -> [S::f32s; 2] {
+    pub fn surface_weights<const W: usize>(&self, simd: S, surfaces: &Surfaces<W>, x: usize) -> [S::f32s; 2] {
         let back = self.at(simd, &surfaces.back, x);
         [back, if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { back }]
     }
@@ -87,11 +110,11 @@ impl<S: Simd> VectorWeight<S> {
     /// Returns premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels with weights `taken`, for
     /// one or two surfaces.
     #[inline(always)]
-    pub fn apply(
+    pub fn apply<const W: usize>(
         &self,
         simd: S,
         taken: [S::f32s; 2],
-        surfaces: &Surfaces<PADDED_BLOCK>,
+        surfaces: &Surfaces<W>,
         x: usize,
     ) -> [S::f32s; SUM_PLANES] {
         let back = scale_surface(simd, taken[0], &surfaces.back, x);
@@ -114,7 +137,7 @@ impl<S: Simd> VectorWeight<S> {
 
     /// Returns the weights of a vector of pixels of one surface.
     #[inline(always)]
-    fn at(&self, simd: S, pixels: &PixelRun<PADDED_BLOCK>, x: usize) -> S::f32s {
+    fn at<const W: usize>(&self, simd: S, pixels: &PixelRun<W>, x: usize) -> S::f32s {
         let [zero, one] = [simd.splat_f32s(0.0), simd.splat_f32s(1.0)];
         let Some([up, down]) = &self.steps else { return one };
         let coc = load::<S>(&pixels.0[3], x);
@@ -133,10 +156,10 @@ pub fn is_zero<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
 
 /// Multiplies a vector of pixels of one surface by their weights, in the layout of [`VectorWeight::apply`].
 #[inline(always)]
-fn scale_surface<S: Simd>(
+fn scale_surface<S: Simd, const W: usize>(
     simd: S,
     weight: S::f32s,
-    pixels: &PixelRun<PADDED_BLOCK>,
+    pixels: &PixelRun<W>,
     x: usize,
 ) -> [S::f32s; SUM_PLANES] {
     let mut values = [weight; SUM_PLANES];
@@ -147,14 +170,14 @@ fn scale_surface<S: Simd>(
     values
 }
 
-/// Applies the tent horizontally: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall
+/// Applies the tent horizontally to a plane: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall
 /// fit in one vector each, and the remaining sums are over runs of `S` values.
 #[inline(always)]
 pub fn downscale_row<V: Simd, const S: usize>(
     simd: V,
-    sums: &[[f32; PADDED_BLOCK]; SUM_PLANES],
+    sum: &[f32; PADDED_BLOCK],
     columns: usize,
-    means: &mut Means,
+    mean: &mut [f32; PLANE_LEN],
 ) {
     // Rising half of the tent, repeated; the falling half follows from it.
     let ramp: [f32; BLOCK] = const {
@@ -174,18 +197,16 @@ pub fn downscale_row<V: Simd, const S: usize>(
         load::<V>(&fall, 0)
     });
     let mut weighed = CacheAligned([0.0f32; BLOCK]);
-    for (mean, sum) in means.0.iter_mut().zip(sums) {
-        let start = MARGIN - S / 2;
-        for x in (0..columns).step_by(V::F32_LANES) {
-            let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
-            store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
+    let start = MARGIN - S / 2;
+    for x in (0..columns).step_by(V::F32_LANES) {
+        let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
+        store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
+    }
+    for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
+        let mut total = 0.0;
+        for value in group {
+            total += value;
         }
-        for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
-            let mut total = 0.0;
-            for value in group {
-                total += value;
-            }
-            *mean = total;
-        }
+        *mean = total;
     }
 }

@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use super::pixels::Radii;
 use super::unpack::{InputFrame, compute_coc_row};
-use crate::bokeh::plan::BinWeight;
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{BinWeight, Plan};
+use crate::bokeh::split::SHARP_PX;
+use crate::frame::Matte;
 use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
@@ -16,8 +19,9 @@ pub const TILE_H: usize = 8;
 /// Neighbourhood that can change a tile, in tiles: the widest filter at full scale of the bin in focus, and the cells
 /// over which its radius is averaged.
 const NEIGHBOURHOOD: (usize, usize) = (1, 3);
-/// Filters of a smaller radius have one tap, in pixels.
-const SHARP_PX: f32 = 0.4;
+
+/// No bin, or several.
+const NO_BIN: u8 = u8::MAX;
 
 /// Columns of the picture inside a block, made together.
 #[derive(Clone, Copy)]
@@ -39,6 +43,8 @@ pub struct Tiles {
     pub still: Vec<bool>,
     /// Per tile, whether it and its neighbourhood are still, so that no bin needs it.
     pub idle: Vec<bool>,
+    /// Per tile, the only bin that it belongs to, as a whole and without mixed pixels, or [`NO_BIN`].
+    only: Vec<u8>,
     scratch: Vec<bool>,
     pub across: usize,
     pub down: usize,
@@ -53,6 +59,7 @@ impl Tiles {
             ranges: vec![(0.0, 0.0); across * down],
             still: flags.clone(),
             idle: flags.clone(),
+            only: vec![NO_BIN; across * down],
             scratch: flags,
             across,
             down,
@@ -66,6 +73,59 @@ impl Tiles {
         let size = (self.across, self.down);
         erode(&self.idle, &mut self.scratch, &mut self.still, size);
         erode(&self.still, &mut self.scratch, &mut self.idle, size);
+    }
+
+    /// Sets the range of all tiles, if it is known without depth.
+    pub fn set_ranges(&mut self, field: &CocField) {
+        let range = match field {
+            CocField::Uniform { radius_px } => (*radius_px, *radius_px),
+            _ => (f32::NEG_INFINITY, f32::INFINITY),
+        };
+        self.ranges.fill(range);
+    }
+
+    /// Finds the tiles that belong to one bin, after the bins are known.
+    pub fn find_only_bins(&mut self, plan: &Plan, matte: Option<&Matte>) {
+        self.only.fill(NO_BIN);
+        if plan.compositing == Compositing::Gather || plan.compositing == Compositing::Select && plan.bins.len() > 1 {
+            return;
+        }
+        for k in 0..plan.bins.len() {
+            let weight = plan.bin_weight(k);
+            for (only, range) in self.only.iter_mut().zip(&self.ranges) {
+                if plan.bins.len() == 1 || weight.at(range.0) == 1.0 && weight.at(range.1) == 1.0 {
+                    *only = k as u8;
+                }
+            }
+        }
+        for pixel in matte.iter().flat_map(|matte| &matte.pixels) {
+            let (x, y) = (pixel.at as usize % plan.width, pixel.at as usize / plan.width);
+            if let Some(only) = self.only.get_mut(y / TILE_H * self.across + x / TILE_W) {
+                *only = NO_BIN;
+            }
+        }
+    }
+
+    /// Returns the only bin that these tiles belong to, if there is one.
+    #[inline(always)]
+    pub fn only_bin(&self, columns: Range<usize>, rows: Range<usize>) -> Option<usize> {
+        let mut all = self.spans(columns, rows).flat_map(|span| &self.only[span]);
+        let first = *all.next()?;
+        (first != NO_BIN && all.all(|&only| only == first)).then_some(usize::from(first))
+    }
+
+    /// Returns the only bin that a tile belongs to, if there is one.
+    #[inline(always)]
+    pub fn only_bin_of(&self, tile: usize) -> Option<usize> {
+        Some(usize::from(self.only[tile])).filter(|&only| only != usize::from(NO_BIN))
+    }
+
+    /// Returns the CoC of these tiles, in pixels, if it is the same everywhere.
+    #[inline(always)]
+    pub fn only_coc(&self, columns: Range<usize>, rows: Range<usize>) -> Option<f32> {
+        let mut all = self.spans(columns, rows).flat_map(|span| &self.ranges[span]);
+        let first = *all.next()?;
+        (first.0 == first.1 && all.all(|&range| range == first)).then_some(first.0)
     }
 
     /// Whether the weight is below 1 at the lowest CoC of any of these tiles.

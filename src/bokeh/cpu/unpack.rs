@@ -106,16 +106,40 @@ impl<'a> InputFrame<'a> {
         Self { size: (plan.width, plan.height), pixels, coc, matte, expansion }
     }
 
+    /// Returns the largest light of a pixel, if there is a bound.
+    pub fn max_light(&self) -> Option<f32> {
+        match self.pixels {
+            Pixels::Linear(_) => None,
+            _ if self.expansion.is_finite() => Some(expansion_factor(1.0, self.expansion)),
+            _ => Some(1.0),
+        }
+    }
+
     /// Unpacks some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
     pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, surfaces: &mut Surfaces<W>) {
-        let width = self.size.0;
-        let row = y * width * 3..(y + 1) * width * 3;
-        let before = (-x0).clamp(0, columns as isize) as usize;
-        let first = x0.max(0) as usize;
-        let end = before + width.saturating_sub(first).min(columns - before);
-        let [red, green, blue, coc] = &mut surfaces.back.0;
-        let count = end - before;
+        let (width, (before, first, count)) = (self.size.0, self.inside(x0, columns));
+        let end = before + count;
+        self.unpack_light::<S, W>(y, x0, columns, &mut surfaces.back);
+        compute_coc_row(self, y, first, &mut surfaces.back.0[3][before..end]);
+        self.separate_surfaces(y * width + first..y * width + first + count, before, surfaces);
+        if before > 0 || end < columns {
+            let Surfaces { back, front, alpha, behind, mixed } = surfaces;
+            let twos = front.0.iter_mut().chain([&mut alpha.0, &mut behind.0]).filter(|_| *mixed);
+            for plane in back.0.iter_mut().chain(twos) {
+                let (left, right) = (plane[before], plane[end - 1]);
+                plane[..before].fill(left);
+                plane[end..columns].fill(right);
+            }
+        }
+    }
+
+    /// Same as [`InputFrame::unpack`], but only the light of pixels, as one surface.
+    #[inline(always)]
+    pub fn unpack_light<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, run: &mut PixelRun<W>) {
+        let (width, (before, first, count)) = (self.size.0, self.inside(x0, columns));
+        let (end, row) = (before + count, y * width * 3..(y + 1) * width * 3);
+        let [red, green, blue, _] = &mut run.0;
         match self.pixels {
             Pixels::Srgb(rgb) => {
                 // Deinterleaved as bytes first, which vectorises.
@@ -148,24 +172,26 @@ impl<'a> InputFrame<'a> {
                 }
             }
         }
-        compute_coc_row(self, y, first, &mut coc[before..end]);
         if self.expansion.is_finite() {
-            let [red, green, blue, _] = &mut surfaces.back.0;
-            for x in 0..columns {
+            let [red, green, blue, _] = &mut run.0;
+            for x in before..end {
                 let factor = expansion_factor(luminance(red[x], green[x], blue[x]), self.expansion);
                 (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
             }
         }
-        self.separate_surfaces(y * width + first..y * width + first + count, before, surfaces);
-        if before > 0 || end < columns {
-            let Surfaces { back, front, alpha, behind, mixed } = surfaces;
-            let twos = front.0.iter_mut().chain([&mut alpha.0, &mut behind.0]).filter(|_| *mixed);
-            for plane in back.0.iter_mut().chain(twos) {
-                let (left, right) = (plane[before], plane[end - 1]);
-                plane[..before].fill(left);
-                plane[end..columns].fill(right);
-            }
+        for plane in &mut run.0[..3] {
+            let (left, right) = (plane[before], plane[end - 1]);
+            plane[..before].fill(left);
+            plane[end..columns].fill(right);
         }
+    }
+
+    /// Returns how many of some columns from `x0` on are before the picture, the first one inside, and their number.
+    #[inline(always)]
+    fn inside(&self, x0: isize, columns: usize) -> (usize, usize, usize) {
+        let before = (-x0).clamp(0, columns as isize) as usize;
+        let first = x0.max(0) as usize;
+        (before, first, self.size.0.saturating_sub(first).min(columns - before))
     }
 
     /// Prefetches the memory that [`InputFrame::unpack`] reads of row `y`.

@@ -133,6 +133,6 @@ impl Ring {
             (None, Some(yuyv)) => Picture::from_yuyv(yuyv, out),
             (None, None) => Picture::from_memory(out),
         };
-        Ok(Some(BlurredFrame { ticket, picture, color, depth, times, reused: 0.0 }))
+        Ok(Some(BlurredFrame { ticket, picture, color, depth, times }))
     }
 }

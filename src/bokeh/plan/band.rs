@@ -23,7 +23,7 @@ impl Plan {
     /// the last frame, and stay.
     pub fn for_band(&self, rows: usize, wanted: Range<usize>) -> Self {
         let band = BandRows { of_picture: self.height, wanted };
-        let mut plan = Self { height: rows, band: Some(band), reuse: false, ..self.clone() };
+        let mut plan = Self { height: rows, band: Some(band), ..self.clone() };
         for bin in &mut plan.bins {
             bin.height = rows.div_ceil(bin.scale);
         }

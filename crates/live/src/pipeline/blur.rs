@@ -219,8 +219,7 @@ impl<'a> Stage<'a> {
         let Some(done) = self.in_flight.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
-        let BlurredFrame { picture, mut color, mut depth, times, reused, .. } = finished;
-        self.times.reused += f64::from(reused);
+        let BlurredFrame { picture, mut color, mut depth, times, .. } = finished;
         let (now_ns, began_ns) = (clock.now_ns(), done.since_ns);
         let (mut frame, InFlight { coc, crop, original, kept }) = done.take_item(now_ns);
         let (kept, kept_ns) = kept.unzip();

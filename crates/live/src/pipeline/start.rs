@@ -52,7 +52,7 @@ impl BlurSetup {
         let bokeh = look.blur_settings(size, adaptive).as_ref().map(make).transpose()?;
         if look.reuse == Reuse::On && bokeh.as_ref().is_some_and(|bokeh| bokeh.backend() != Backend::Cpu) {
             tracing::warn!(
-                "without effect here: --reuse on (the GPU blurs all of every frame; --backend cpu keeps parts)"
+                "without effect here: --reuse on (the GPU blurs every frame on its own; --backend cpu steadies what is behind)"
             );
         }
         let (changes, to_come) = ChangeSender::new(look.clone(), size, adaptive);

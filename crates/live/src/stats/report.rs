@@ -57,8 +57,6 @@ pub struct Report {
     pub misses: u64,
     /// Frames that reused the depth of an earlier one, warped with the picture, to save time.
     pub depth_held: u64,
-    /// Mean fraction of the blurred pictures that was kept from earlier frames, 0 to 1.
-    pub blur_reused: f64,
     /// How often a live output was sent its last picture again because no new one came.
     pub repeats: u64,
     /// `cpu`, `gpu` or `none`.
@@ -205,7 +203,6 @@ impl Report {
             budget_ms: to_ms(info.budget_ns),
             misses: timings.blur.misses,
             depth_held: timings.depth.reused,
-            blur_reused: timings.blur.reused / (timings.blur.took.samples().max(1) as f64),
             repeats: timings.sink.repeats + info.outputs.iter().map(|output| output.repeats).sum::<u64>(),
             backend,
             adapter,

@@ -76,13 +76,6 @@ impl fmt::Display for Report {
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames reused that of an earlier frame, to save time", self.depth_held)?;
         }
-        if self.blur_reused > 0.0 {
-            write!(
-                f,
-                "\nblur: {:.0} % of the pictures kept from earlier frames, as they hardly changed",
-                100.0 * self.blur_reused
-            )?;
-        }
         if let Some(energy_j) = self.energy_j.filter(|_| *delivered > 0) {
             write!(f, "\nenergy of the processor: {:.3} J a frame", energy_j / *delivered as f64)?;
         }

@@ -33,7 +33,7 @@ fn ready() -> FakeBokeh {
                 Picture::from_memory(out)
             }
         };
-        BlurredFrame { ticket, picture, color, depth, times: PassTimes::new(), reused: 0.0 }
+        BlurredFrame { ticket, picture, color, depth, times: PassTimes::new() }
     };
     FakeBokeh { backend: Backend::Gpu, makes: Box::new(makes), ..fake_bokeh(3, Trouble::default()) }
 }
