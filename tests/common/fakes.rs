@@ -221,7 +221,7 @@ pub fn changed(mut job: Job, times: PassTimes, change: impl FnOnce(&mut Job)) ->
     job.out.rgb.copy_from_slice(&job.color.rgb);
     change(&mut job);
     let Job { ticket, out, color, depth, .. } = job;
-    BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times, reused: 0.0 }
+    BlurredFrame { ticket, picture: Picture::from_memory(out), color, depth, times }
 }
 
 impl Bokeh for FakeBokeh {

@@ -28,7 +28,7 @@ pub struct Band<'a> {
     /// Per block, the first bin that waits for inpainting, or [`NO_BIN`].
     pub first_pending: &'a mut [usize],
     /// Scratch memory of the thread.
-    pub sums: &'a mut BandSums,
+    pub scratch: &'a mut BandScratch,
 }
 
 /// How a band treats pixels that near objects occlude.
@@ -64,12 +64,15 @@ const PREFETCH_ROWS: isize = 2;
 /// No bin waits.
 pub const NO_BIN: usize = usize::MAX;
 
-/// Sums of a thread for each bin.
-pub struct BandSums(Vec<BinSums>);
+/// Scratch memory of a thread: the sums of each bin, and a row of pixels.
+pub struct BandScratch {
+    sums: Vec<BinSums>,
+    surfaces: Surfaces<PADDED_BLOCK>,
+}
 
-impl BandSums {
+impl BandScratch {
     pub fn new() -> Self {
-        Self(vec![BinSums::new(); MAX_BINS])
+        Self { sums: vec![BinSums::new(); MAX_BINS], surfaces: Surfaces::new() }
     }
 }
 
@@ -188,7 +191,8 @@ impl Band<'_> {
         }
         let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns);
         let radius_px = self.tiles.only_coc(tile_columns, tile_rows);
-        let mut surfaces: Surfaces<PADDED_BLOCK> = Surfaces::new();
+        let BandScratch { sums, surfaces } = &mut *self.scratch;
+        surfaces.mixed = false;
         let (left, padded) = (x0 as isize - MARGIN as isize, columns + 2 * MARGIN);
         let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
@@ -201,40 +205,39 @@ impl Band<'_> {
                 Content::One(_) if radius_px.is_some() && !is_read => {
                     self.source.unpack_light::<V, PADDED_BLOCK>(inside, left, padded, &mut surfaces.back);
                 }
-                _ => self.source.unpack::<V, PADDED_BLOCK>(inside, left, padded, &mut surfaces),
+                _ => self.source.unpack::<V, PADDED_BLOCK>(inside, left, padded, surfaces),
             }
             match &mut self.inpainting {
                 Inpainting::NotNeeded => {}
                 Inpainting::Pending { halves, .. } => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add_row(x0, MARGIN..MARGIN + columns, y as usize, &surfaces);
+                        halves.add_row(x0, MARGIN..MARGIN + columns, y as usize, surfaces);
                     }
                 }
                 Inpainting::Done { background, .. } => {
                     let width = self.source.size.0;
-                    background.inpaint(simd, left, inside, width, &mut surfaces);
+                    background.inpaint(simd, left, inside, width, surfaces);
                 }
             }
             let row = match content {
                 Content::One(_) => Row::Whole(radius_px),
                 Content::Mixed => {
                     let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-                    extend_range(&mut range, &surfaces.back.0[3][..padded], |coc_px| coc_px);
+                    extend_range(&mut range, std::iter::once(&surfaces.back.0[3][..padded]), |coc_px| coc_px);
                     if surfaces.mixed {
-                        extend_range(&mut range, &surfaces.front.0[3][..padded], |coc_px| coc_px);
+                        extend_range(&mut range, std::iter::once(&surfaces.front.0[3][..padded]), |coc_px| coc_px);
                     }
                     Row::Weighted(range)
                 }
             };
             let at = (run, y - first);
-            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
-            {
+            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut *sums).zip(active).filter(|(_, active)| *active) {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add_row::<V, 1>(simd, sums, at, &surfaces, row),
-                    2 => bin.add_row::<V, 2>(simd, sums, at, &surfaces, row),
-                    4 => bin.add_row::<V, 4>(simd, sums, at, &surfaces, row),
-                    _ => bin.add_row::<V, 8>(simd, sums, at, &surfaces, row),
+                    1 => bin.add_row::<V, 1>(simd, sums, at, surfaces, row),
+                    2 => bin.add_row::<V, 2>(simd, sums, at, surfaces, row),
+                    4 => bin.add_row::<V, 4>(simd, sums, at, surfaces, row),
+                    _ => bin.add_row::<V, 8>(simd, sums, at, surfaces, row),
                 }
             }
         }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::encode::{CHUNK, Encoder};
-use super::enlarge::Enlarge;
+use super::enlarge::{CodeRows, Enlarge};
 use super::layers::Layers;
 use super::pixels::Sample;
 use super::rows::{COPY_WIDTH, STRIP, STRIP_ROW, Slot};
@@ -40,9 +40,22 @@ pub struct Composite<'a, T> {
     pub encoder: &'a Encoder,
     pub y0: usize,
     /// Scratch memory of the thread.
-    pub layers: &'a mut Layers,
+    pub scratch: &'a mut CompositeScratch,
     /// Output: whole rows of RGB.
     pub out: &'a mut [T],
+}
+
+/// Scratch memory of a thread.
+pub struct CompositeScratch {
+    layers: Layers,
+    in_focus: Surfaces<CHUNK>,
+    codes: CodeRows,
+}
+
+impl CompositeScratch {
+    pub fn new() -> Self {
+        Self { layers: Layers::new(), in_focus: Surfaces::new(), codes: CodeRows::new() }
+    }
 }
 
 /// What adjacent tiles of a chunk show.
@@ -62,7 +75,7 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
     fn with_simd<S: Simd>(mut self, simd: S) {
         let width = self.plan.width;
         let out = std::mem::take(&mut self.out);
-        self.layers.set_near_border(self.plan.near_border());
+        self.scratch.layers.set_near_border(self.plan.near_border());
         for x0 in (0..width).step_by(CHUNK) {
             let mut spread = [false; MAX_BINS];
             for (spread, bin) in spread.iter_mut().zip(&self.plan.bins) {
@@ -133,8 +146,11 @@ impl<T: Sample> Composite<'_, T> {
             Content::One(only) => {
                 let (bin, expansion) = (&self.plan.bins[only], self.frame.expansion);
                 let Some(codes) = T::as_codes(out) else { return };
-                Enlarge { bin, slot: &self.slots[bin.slot], y0: self.y0, x0, columns, width, expansion }
-                    .show(simd, codes);
+                Enlarge { bin, slot: &self.slots[bin.slot], y0: self.y0, x0, columns, width, expansion }.show(
+                    simd,
+                    codes,
+                    &mut self.scratch.codes,
+                );
             }
             Content::Mixed => self.composite(simd, x0, columns, out),
         }
@@ -162,11 +178,18 @@ impl<T: Sample> Composite<'_, T> {
                     self.read_layers(simd, y, x0, vectors.clone());
                     // Several surfaces are visible only near silhouettes; elsewhere a cheaper compositing suffices.
                     let proximity = if may_be_near { self.silhouettes.proximity(y, x0) } else { None };
-                    let is_one_surface = proximity.is_none() && self.layers.have_one_surface(ranges);
+                    let is_one_surface = proximity.is_none() && self.scratch.layers.have_one_surface(ranges);
                     if !is_one_surface {
                         compute_coc_row(self.frame, y, x0 + columns.start, &mut coc_px[columns.clone()]);
                     }
-                    self.layers.composite(simd, vectors.clone(), &proximity, &coc_px, is_one_surface, &mut color);
+                    self.scratch.layers.composite(
+                        simd,
+                        vectors.clone(),
+                        &proximity,
+                        &coc_px,
+                        is_one_surface,
+                        &mut color,
+                    );
                 }
                 Compositing::Select => self.select_by_coc(simd, y, x0, columns.clone(), &mut color.0),
                 Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
@@ -200,13 +223,16 @@ impl<T: Sample> Composite<'_, T> {
     /// Reads the bins with content in some `columns` of a chunk.
     #[inline(always)]
     fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, columns: Range<usize>) {
-        let (plan, layers) = (self.plan, &mut *self.layers);
+        let CompositeScratch { layers, in_focus, .. } = &mut *self.scratch;
+        let plan = self.plan;
         layers.clear();
         let sharp = plan.sharp_bin();
         for (k, bin) in plan.bins.iter().enumerate() {
             let buffer = layers.next_buffer();
             let has_content = match Some(k) == sharp {
-                true => read_in_focus(simd, self.frame, &plan.bin_weight(k), (x0, y), columns.clone(), buffer),
+                true => {
+                    read_in_focus(simd, self.frame, &plan.bin_weight(k), (x0, y), columns.clone(), in_focus, buffer)
+                }
                 false => sample_bin(simd, bin, &self.slots[bin.slot], y, x0, buffer),
             };
             if has_content {
@@ -225,8 +251,8 @@ impl<T: Sample> Composite<'_, T> {
         columns: Range<usize>,
         color: &mut [[f32; CHUNK]; 3],
     ) {
-        self.layers.clear();
-        let layer = self.layers.next_buffer();
+        self.scratch.layers.clear();
+        let layer = self.scratch.layers.next_buffer();
         let mut coc = [0.0; CHUNK];
         compute_coc_row(self.frame, y, x0 + columns.start, &mut coc[columns.clone()]);
         *color = [[0.0; CHUNK]; 3];
@@ -253,16 +279,16 @@ fn read_in_focus<S: Simd>(
     weight: &BinWeight,
     (x0, y): (usize, usize),
     columns: Range<usize>,
+    surfaces: &mut Surfaces<CHUNK>,
     out: &mut [[f32; CHUNK]; 4],
 ) -> bool {
-    let mut surfaces = Surfaces::<CHUNK>::new();
-    frame.unpack::<S, CHUNK>(y, (x0 + columns.start) as isize, columns.len(), &mut surfaces);
+    frame.unpack::<S, CHUNK>(y, (x0 + columns.start) as isize, columns.len(), surfaces);
     let weight = VectorWeight::new(simd, &Some(*weight));
     let mut some = false;
     for x in (0..columns.len()).step_by(S::F32_LANES) {
-        let taken = weight.surface_weights(simd, &surfaces, x);
+        let taken = weight.surface_weights(simd, surfaces, x);
         some |= !is_zero(simd, taken);
-        let values = weight.apply(simd, taken, &surfaces, x);
+        let values = weight.apply(simd, taken, surfaces, x);
         for p in 0..4 {
             store::<S>(&mut out[p], columns.start + x, values[p]);
         }

@@ -81,12 +81,12 @@ impl Strip<'_> {
             let first_unmade = (y / CELL..height.div_ceil(CELL)).find(|&row| !self.scratch.made[row]);
             let end = first_unmade.map_or(height, |row| row * CELL);
             let first = y as isize - down;
-            // Sums are differences of rows: any start value will do.
-            sums[((first - 1) as usize & (rows - 1)) * P..][..P].as_flattened_mut().fill(0);
+            let mut running = [[0; C]; P];
+            sums[((first - 1) as usize & (rows - 1)) * P..][..P].copy_from_slice(&running);
             self.copy_lines::<C>(first - 1..first + 1, lines);
             for next in first..end as isize + down {
                 self.copy_lines::<C>(next + 1..next + 2, lines);
-                self.add_row::<S, P, C>((next, rows), lines, smoothing, steps, sums);
+                self.add_row::<S, P, C>((next, rows), lines, (smoothing, steps), &mut running, sums);
                 if next - down >= y as isize {
                     let row = (next - down) as usize;
                     self.sum_row::<S, P, C>(simd, discs, (row, rows), 1.0 / steps, sums);
@@ -117,26 +117,26 @@ impl Strip<'_> {
         &mut self,
         (y, rows): (isize, usize),
         lines: &[f32],
-        smoothing: f32,
-        steps: f32,
+        (smoothing, steps): (f32, f32),
+        running: &mut [[u32; C]; P],
         sums: &mut [[u32; C]],
     ) {
         const TO_INTEGER: f32 = (1 << 23) as f32;
         let line = |y: isize, p: usize| -> &[f32; C] { &lines[(y as usize % LINES) * 4 * C..].as_chunks::<C>().0[p] };
         let middle = 1.0 - 2.0 * smoothing;
-        let (before, here) = ((y - 1) as usize & (rows - 1), y as usize & (rows - 1));
+        let here = &mut sums[(y as usize & (rows - 1)) * P..][..P];
         for p in 0..P {
             let (above, own, below) = (line(y - 1, p), line(y, p), line(y + 1, p));
             let mut smoothed = [0.0; C];
             for x in 0..C {
                 smoothed[x] = madd::<S>(above[x] + below[x], smoothing, own[x] * middle) * steps;
             }
-            let last = sums[before * P + p];
-            let out = &mut sums[here * P + p];
+            let (running, out) = (&mut running[p], &mut here[p]);
             for x in 1..C - 1 {
                 let value = madd::<S>(smoothed[x - 1] + smoothed[x + 1], smoothing, smoothed[x] * middle);
                 let value = (value + TO_INTEGER).to_bits().wrapping_sub(TO_INTEGER.to_bits());
-                out[x] = last[x].wrapping_add(value);
+                running[x] = running[x].wrapping_add(value);
+                out[x] = running[x];
             }
         }
     }

@@ -26,6 +26,15 @@ const ROWS: usize = TILE_H / 2 + 2;
 /// A row of a bin in a chunk, as codes: r, g, b.
 type CodeRow = CacheAligned<[[f32; ACROSS]; 3]>;
 
+/// Scratch memory: the rows of a bin that a chunk shows.
+pub struct CodeRows(Box<[CodeRow; ROWS]>);
+
+impl CodeRows {
+    pub fn new() -> Self {
+        Self(Box::new([CacheAligned([[0.0; ACROSS]; 3]); ROWS]))
+    }
+}
+
 /// A chunk of a row of tiles that shows one bin.
 pub struct Enlarge<'a> {
     pub bin: &'a Bin,
@@ -44,20 +53,19 @@ pub struct Enlarge<'a> {
 impl Enlarge<'_> {
     /// Writes 8-bit sRGB to the rows `out` of the picture.
     #[inline(always)]
-    pub fn show<S: Simd>(&self, _: S, out: &mut [u8]) {
+    pub fn show<S: Simd>(&self, _: S, out: &mut [u8], codes: &mut CodeRows) {
         match self.bin.scale {
-            2 => self.show_scale::<S, 2>(out),
-            4 => self.show_scale::<S, 4>(out),
-            _ => self.show_scale::<S, 8>(out),
+            2 => self.show_scale::<S, 2>(out, &mut codes.0),
+            4 => self.show_scale::<S, 4>(out, &mut codes.0),
+            _ => self.show_scale::<S, 8>(out, &mut codes.0),
         }
     }
 
     #[inline(always)]
-    fn show_scale<S: Simd, const N: usize>(&self, out: &mut [u8]) {
+    fn show_scale<S: Simd, const N: usize>(&self, out: &mut [u8], codes: &mut [CodeRow; ROWS]) {
         let last = self.bin.height - 1;
         let first_row = (self.y0 / N).saturating_sub(1);
         let rows = TILE_H / N + 2;
-        let mut codes = [CacheAligned([[0.0f32; ACROSS]; 3]); ROWS];
         for (k, codes) in codes[..rows].iter_mut().enumerate() {
             self.encode_row::<S, N>((first_row + k).min(last), codes);
         }

@@ -201,11 +201,6 @@ impl Layers {
         self.near += usize::from(bin.near);
     }
 
-    /// Returns the number of layers.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
     /// Whether every layer fully counts as the surface of each pixel whose CoC is in one of these ranges.
     #[inline(always)]
     pub fn have_one_surface(&self, ranges_px: &[(f32, f32)]) -> bool {

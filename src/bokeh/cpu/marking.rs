@@ -19,8 +19,8 @@ const FAR_M: f32 = 1e6;
 /// Marks the silhouettes of a row of tiles.
 pub struct MarkSilhouettes<'a> {
     pub source: &'a InputFrame<'a>,
-    /// CoC range of each tile.
-    pub ranges: &'a [(f32, f32)],
+    /// CoC range of each tile, in this row of tiles and in the next one.
+    pub ranges: [&'a [(f32, f32)]; 2],
     /// Rows of the picture; `marks` are the rows of the grid over them.
     pub rows: std::ops::Range<usize>,
     pub marks: &'a mut [f32],
@@ -52,7 +52,8 @@ impl WithSimd for MarkSilhouettes<'_> {
                 let take = CHUNK.min(width - x0);
                 let with_next = (take + 1).min(width - x0);
                 // No step within a tile, or to the next one, exceeds their CoC range.
-                if next < self.rows.end && coc_span_px(&self.ranges[x0 / TILE_W..]) < min_step_px {
+                let tiles = self.ranges.map(|ranges| &ranges[x0 / TILE_W..]);
+                if coc_span_px(tiles, next >= self.rows.end) < min_step_px {
                     continue;
                 }
                 // The test on depth needs no division and rejects nearly all pixels.
@@ -109,12 +110,11 @@ impl MarkSilhouettes<'_> {
     }
 }
 
-/// Returns the CoC range of the first two tiles together.
+/// Returns the CoC range of the first two tiles together, and of the one below if it is `with_below`.
 #[inline(always)]
-fn coc_span_px(ranges: &[(f32, f32)]) -> f32 {
-    let (low_px, high_px) = ranges[0];
-    let (next_low_px, next_high_px) = ranges[1.min(ranges.len() - 1)];
-    high_px.max(next_high_px) - low_px.min(next_low_px)
+fn coc_span_px([here, below]: [&[(f32, f32)]; 2], with_below: bool) -> f32 {
+    let (first, second, below) = (here[0], here[1.min(here.len() - 1)], if with_below { below[0] } else { here[0] });
+    first.1.max(second.1).max(below.1) - first.0.min(second.0).min(below.0)
 }
 
 #[inline(always)]

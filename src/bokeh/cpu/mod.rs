@@ -33,7 +33,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use band::{BandSums, NO_BIN};
+use band::{BandScratch, NO_BIN};
 use blur::Scratch;
 use encode::{EncodeTable, Encoder};
 use gather::Gather;
@@ -72,10 +72,10 @@ pub struct CpuBokeh {
 /// Scratch memory of one thread.
 struct ThreadScratch {
     coc: Vec<f32>,
-    sums: BandSums,
+    band: BandScratch,
     dilation: Vec<f32>,
     blur: Scratch,
-    layers: layers::Layers,
+    composite: composite::CompositeScratch,
 }
 
 impl CpuBokeh {
@@ -88,11 +88,11 @@ impl CpuBokeh {
         let thread_scratch = (0..workers.thread_count())
             .map(|_| ThreadScratch {
                 coc: vec![0.0; width],
-                sums: BandSums::new(),
+                band: BandScratch::new(),
                 // The pass needs a grid and one row of it.
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
-                layers: layers::Layers::new(),
+                composite: composite::CompositeScratch::new(),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();

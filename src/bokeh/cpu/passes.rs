@@ -29,7 +29,6 @@ impl CpuBokeh {
             let mut alone = [AtomicBool::new(false)];
             let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
             let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
-            let marks = self.silhouettes.marks(TILE_H);
             let arch = self.arch;
             self.workers.run_with(
                 &mut self.thread_scratch,
@@ -39,17 +38,17 @@ impl CpuBokeh {
                         return frame.coc.split(&mut plan.part(0)[0]);
                     };
                     let ranges = ranges.part(row);
-                    arch.dispatch(ComputeTileRanges { source: frame, row, ranges: &mut *ranges, coc: &mut thread.coc });
-                    let rows = row * TILE_H..((row + 1) * TILE_H).min(frame.size.1);
-                    arch.dispatch(MarkSilhouettes {
-                        source: frame,
-                        ranges,
-                        rows,
-                        marks: marks.part(row),
-                        near_from_px,
-                    });
+                    arch.dispatch(ComputeTileRanges { source: frame, row, ranges, coc: &mut thread.coc });
                 },
             );
+            let (all, marks) = (&self.tiles.ranges, self.silhouettes.marks(TILE_H));
+            self.workers.run(self.tiles.down, &|row| {
+                let ranges = |row: usize| &all[row.min(all.len() / across - 1) * across..][..across];
+                let (ranges, rows) =
+                    ([ranges(row), ranges(row + 1)], row * TILE_H..((row + 1) * TILE_H).min(frame.size.1));
+                let marks = marks.part(row);
+                arch.dispatch(MarkSilhouettes { source: frame, ranges, rows, marks, near_from_px });
+            });
             self.silhouettes.dilate(&mut self.workers, arch);
         } else if let Radii::Field(field, _) = frame.coc {
             self.tiles.set_ranges(field);
@@ -120,7 +119,7 @@ impl CpuBokeh {
                 }),
                 inpainting,
                 first_pending: first_pending.part(band),
-                sums: &mut thread.sums,
+                scratch: &mut thread.band,
             });
         });
     }
@@ -194,7 +193,7 @@ impl CpuBokeh {
             &mut self.thread_scratch,
             plan.height.div_ceil(TILE_H),
             &|thread: &mut ThreadScratch, part| {
-                let (y0, layers, wanted) = (part * TILE_H, &mut thread.layers, plan.wanted_rows());
+                let (y0, scratch, wanted) = (part * TILE_H, &mut thread.composite, plan.wanted_rows());
                 if y0 >= wanted.end || y0 + TILE_H <= wanted.start {
                     return;
                 }
@@ -209,7 +208,7 @@ impl CpuBokeh {
                     gathered,
                     encoder,
                     y0,
-                    layers,
+                    scratch,
                     out,
                 });
             },

@@ -14,7 +14,7 @@ use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{abs, fma, load, store};
 
 /// Columns on both sides of a block that its averages include.
-pub const MARGIN: usize = 16;
+pub const MARGIN: usize = 8;
 /// Columns of a block and its margins.
 pub const PADDED_BLOCK: usize = BLOCK + 2 * MARGIN;
 /// Length of a plane of a block: one cache line more than needed, because planes at multiples of 4096 bytes conflict.

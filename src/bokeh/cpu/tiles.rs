@@ -170,18 +170,20 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
             _ => None,
         };
         self.ranges.fill((f32::INFINITY, f32::NEG_INFINITY));
-        for y in self.row * TILE_H..((self.row + 1) * TILE_H).min(height) {
-            let values = match direct {
-                Some((_, map)) => &map.metres[y * width..][..width],
-                None => {
-                    compute_coc_row(self.source, y, 0, self.coc);
-                    &*self.coc
-                }
-            };
-            for (range, values) in self.ranges.iter_mut().zip(values.chunks(TILE_W)) {
+        let rows = self.row * TILE_H..((self.row + 1) * TILE_H).min(height);
+        if let Some((_, map)) = direct {
+            for (tile, range) in self.ranges.iter_mut().enumerate() {
+                let x0 = tile * TILE_W;
+                let row = |y: usize| &map.metres[y * width + x0..][..TILE_W.min(width - x0)];
                 // Unknown depth counts as infinite.
-                let unknown = |value: f32| direct.is_some() && (value <= 0.0 || value.is_nan());
-                extend_range(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
+                extend_range(range, rows.clone().map(row), |metres| if metres > 0.0 { metres } else { f32::INFINITY });
+            }
+        } else {
+            for y in rows {
+                compute_coc_row(self.source, y, 0, self.coc);
+                for (range, values) in self.ranges.iter_mut().zip(self.coc.chunks(TILE_W)) {
+                    extend_range(range, std::iter::once(values), |coc_px| coc_px);
+                }
             }
         }
         if let Some(matte) = self.source.matte {
@@ -197,16 +199,22 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
     }
 }
 
-/// Widens a range by some values, each mapped by `of`.
+/// Widens a range by the values of some rows, each mapped by `of`.
 #[inline(always)]
-pub fn extend_range(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
+pub fn extend_range<'a>(range: &mut (f32, f32), rows: impl Iterator<Item = &'a [f32]>, of: impl Fn(f32) -> f32) {
     let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
-    let (vectors, rest) = values.as_chunks::<16>();
-    for values in vectors {
-        for k in 0..16 {
-            let value = of(values[k]);
-            low[k] = if value < low[k] { value } else { low[k] };
-            high[k] = if value > high[k] { value } else { high[k] };
+    for row in rows {
+        let (vectors, rest) = row.as_chunks::<16>();
+        for values in vectors {
+            for k in 0..16 {
+                let value = of(values[k]);
+                low[k] = if value < low[k] { value } else { low[k] };
+                high[k] = if value > high[k] { value } else { high[k] };
+            }
+        }
+        for &value in rest {
+            let value = of(value);
+            (low[0], high[0]) = (low[0].min(value), high[0].max(value));
         }
     }
     // Reduction in halves, because a sequential one would wait for each value.
@@ -217,10 +225,6 @@ pub fn extend_range(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> 
         }
     }
     (range.0, range.1) = (range.0.min(low[0]), range.1.max(high[0]));
-    for value in rest {
-        let value = of(*value);
-        (range.0, range.1) = (range.0.min(value), range.1.max(value));
-    }
 }
 
 /// Erosion: a tile stays set if its whole neighbourhood is set.
