@@ -32,18 +32,6 @@ impl Color {
         let of_mean = outer_product(mean);
         Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
     }
-
-    /// Adds another colour times a weight.
-    #[inline(always)]
-    pub(super) fn add(&mut self, weight: f32, other: &Self) {
-        self.mean.iter_mut().zip(other.mean).for_each(|(sum, value)| *sum += weight * value);
-        self.covariance.iter_mut().zip(other.covariance).for_each(|(sum, value)| *sum += weight * value);
-    }
-
-    #[inline(always)]
-    pub(super) fn scaled(self, scale: f32) -> Self {
-        Self { mean: self.mean.map(|value| scale * value), covariance: self.covariance.map(|value| scale * value) }
-    }
 }
 
 /// Colours of two surfaces, and how well they can be separated.
@@ -66,8 +54,10 @@ pub(super) struct Discriminant {
     pub precision: f32,
 }
 
-/// Lengths of [`Contrast::discriminant_params`] and of [`Contrast::foreground_params`].
+/// Lengths of [`Contrast::discriminant_params`], of [`Contrast::surface_params`], and of
+/// [`Contrast::foreground_params`].
 const DISCRIMINANT_PARAMS: usize = 5;
+const SURFACE_PARAMS: usize = 8;
 const FOREGROUND_PARAMS: usize = 9;
 
 impl Discriminant {
@@ -95,14 +85,6 @@ impl Discriminant {
     }
 }
 
-impl From<[f32; DISCRIMINANT_PARAMS]> for Discriminant {
-    /// Restores the discriminant of a [`Contrast::discriminant_params`].
-    #[inline(always)]
-    fn from([x, y, z, offset, precision]: [f32; DISCRIMINANT_PARAMS]) -> Self {
-        Self { direction: [x, y, z], offset, precision }
-    }
-}
-
 impl Contrast {
     /// Computes the contrast of the near and the far surface's colours.
     #[inline(always)]
@@ -125,6 +107,15 @@ impl Contrast {
     pub(super) fn discriminant_params(&self) -> [f32; DISCRIMINANT_PARAMS] {
         let Discriminant { direction: [x, y, z], offset, precision } = self.discriminant;
         [x, y, z, offset, precision]
+    }
+
+    /// Returns the means of the near and of the far surface's colours, and their mean variances.
+    #[inline(always)]
+    pub(super) fn surface_params(&self) -> [f32; SURFACE_PARAMS] {
+        let [near, far] = &self.surfaces;
+        let ([a, b, c], [d, e, f]) = (near.mean, far.mean);
+        let variance = |color: &Color| (color.covariance[0] + color.covariance[3] + color.covariance[5]) / 3.0;
+        [a, b, c, d, e, f, variance(near), variance(far)]
     }
 
     /// Returns the parameters for a known background, for [`Discriminant::against_background`].
@@ -179,7 +170,7 @@ impl Contrast {
 /// `own` colour (Chuang et al. 2001, equation 9, without the noise term). Clamped so that neither is darker than black
 /// or brighter than white.
 #[inline(always)]
-pub(super) fn color_difference(near: &Color, far: &Color, own: [f32; 3], alpha: f32) -> [f32; 3] {
+fn color_difference(near: &Color, far: &Color, own: [f32; 3], alpha: f32) -> [f32; 3] {
     let rest = 1.0 - alpha;
     let (mut spread, mut residual) = ([0.0; 6], [0.0; 3]);
     for k in 0..6 {

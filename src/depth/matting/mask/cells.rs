@@ -1,87 +1,36 @@
-//! Cells of a picture: their trimap label from the mask, and the colours of both surfaces around.
+//! Cells of a picture: their trimap label from the mask.
 
 use std::ops::Range;
 
-use pulp::Simd;
-
 use super::BackgroundPlate;
-use crate::depth::matting::contrast::{Color, Contrast};
-use crate::depth::matting::symmetric::{Symmetric, outer_product};
+use crate::depth::bitmap::Bitmap;
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};
 
 /// Mask value from which a pixel is surely near; below 1 minus this, it is surely far.
-const SURE: f32 = 0.95;
-/// Radius in cells within which colours are gathered.
-pub const RADIUS: usize = 5;
-/// Minimum weight of a surface's pixels for its colour to be known.
-const MIN_WEIGHT: f32 = 0.5;
+pub const SURE: f32 = 0.95;
 
-/// Variance of a background picture's light: noise, and half a pixel of shift.
-const NOISE: f32 = 2e-4;
-
-/// Weights of the cells around one, by row and column.
-pub type Kernel = [[f32; 2 * RADIUS + 1]; 2 * RADIUS + 1];
+/// Mask pixels up to this distance from a cell count for its label, in mask pixels: half a pixel reaches all between which
+/// its pixels are interpolated, and the rest allows for errors of the mask's outline.
+const REACH: f32 = 0.75;
 
 /// Trimap label of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
     Near,
     Far,
-    /// The unknown region: mask undecided, in the cell or beside it.
+    /// The unknown region: mask undecided in the cell, or close to it.
     Band,
 }
 
-/// Sums over the pixels of both surfaces in a cell, [`SURFACE`] numbers each: count, light, products of light.
-#[derive(Clone, Copy, Debug)]
-pub struct Sums([f32; 2 * SURFACE]);
-
-/// Numbers per surface: padded from ten to whole vectors.
-const SURFACE: usize = 12;
-/// Indices of the near and the far surface.
-const NEAR: usize = 0;
-const FAR: usize = 1;
-
-impl Sums {
-    const NONE: Self = Self([0.0; 2 * SURFACE]);
-
-    #[inline(always)]
-    fn add(&mut self, surface: usize, light: [f32; 3]) {
-        let sums = &mut self.0[surface * SURFACE..][..SURFACE];
-        let [xx, xy, xz, yy, yz, zz] = outer_product(light);
-        let values = [1.0, light[0], light[1], light[2], xx, xy, xz, yy, yz, zz, 0.0, 0.0];
-        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-    }
-
-    // Explicit vectors: the compiler unrolls the loop over all numbers instead, one at a time.
-    #[inline(always)]
-    fn add_weighted<S: Simd>(&mut self, simd: S, other: &Self, weight: f32) {
-        let ((sums, last), (others, last_others)) = (S::as_mut_simd_f32s(&mut self.0), S::as_simd_f32s(&other.0));
-        let weights = simd.splat_f32s(weight);
-        for (sum, &value) in sums.iter_mut().zip(others) {
-            *sum = simd.add_f32s(*sum, simd.mul_f32s(weights, value));
-        }
-        for (sum, value) in last.iter_mut().zip(last_others) {
-            *sum += weight * value;
-        }
-    }
-
-    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background, the far colour is just its
-    /// noise.
-    fn colors(&self, is_background_known: bool) -> Option<[Color; 2]> {
-        let noise = Color { mean: [0.0; 3], covariance: [NOISE, 0.0, 0.0, NOISE, 0.0, NOISE] };
-        let weights = [self.0[0], self.0[SURFACE]];
-        let color = |k: usize| {
-            let sums = &self.0[k * SURFACE + 1..];
-            let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
-            Color::from_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
-        };
-        match weights.map(|weight| weight > MIN_WEIGHT) {
-            [true, _] if is_background_known => Some([color(NEAR), noise]),
-            [true, true] => Some([color(NEAR), color(FAR)]),
-            _ => None,
-        }
-    }
+/// The pixels of a run of cells with one label.
+#[derive(Clone, Debug)]
+pub struct Run {
+    pub cell: Cell,
+    /// Row of cells.
+    pub row: usize,
+    /// Columns of pixels.
+    pub xs: Range<usize>,
 }
 
 /// The input of matting, and the layout of its cells.
@@ -115,113 +64,113 @@ impl MaskView<'_> {
     /// Returns the linear light of a pixel.
     #[inline(always)]
     pub fn light_at(&self, at: usize) -> [f32; 3] {
-        [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
+        let rgb = &self.color.rgb[3 * at..][..3];
+        [self.light[usize::from(rgb[0])], self.light[usize::from(rgb[1])], self.light[usize::from(rgb[2])]]
     }
 
-    /// Returns a function from the column to the mask value in a row of pixels, bilinearly interpolated.
+    /// Interpolates the mask vertically, to a row of pixels.
     #[inline(always)]
-    pub fn mask_in_row(&self, y: usize) -> impl Fn(usize) -> f32 {
+    pub fn interpolate_mask_row(&self, y: usize, mask_row: &mut Vec<f32>) {
         let width = self.mask.width as usize;
         let Tap { first, second, weight } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
-        let row = |row: usize| &self.mask.alpha[row * width..][..width];
-        let (above, below, columns) = (row(first), row(second), self.columns);
-        move |x| {
-            let across = &columns[x];
-            let between = |row: &[f32]| row[across.first] + (row[across.second] - row[across.first]) * across.weight;
-            let above = between(above);
-            above + (between(below) - above) * weight
+        let (above, below) = (&self.mask.alpha[first * width..][..width], &self.mask.alpha[second * width..][..width]);
+        mask_row.resize(width, 0.0);
+        for ((value, above), below) in mask_row.iter_mut().zip(above).zip(below) {
+            *value = above + (below - above) * weight;
         }
     }
 
-    /// Computes the trimap label of each cell. `ends` is scratch memory.
+    /// Returns the mask value in a column of pixels, interpolated horizontally.
     #[inline(always)]
-    pub fn classify_cells(&self, cells: &mut Vec<Cell>, ends: &mut Vec<[f32; 2]>) {
-        let (across, down, mask) = (self.across, self.down, self.mask);
-        let range = |of: usize, count: usize, side: usize| {
-            // The mask pixels of a cell plus one on each side: the unknown region is up to a cell wider than necessary.
+    pub fn mask_at(&self, mask_row: &[f32], x: usize) -> f32 {
+        let Tap { first, second, weight } = self.columns[x];
+        mask_row[first] + (mask_row[second] - mask_row[first]) * weight
+    }
+
+    /// Computes the trimap label of each cell. `spans` and `undecided` are scratch memory.
+    #[inline(always)]
+    pub fn classify_cells(&self, cells: &mut Vec<Cell>, spans: &mut Vec<Range<usize>>, undecided: &mut Vec<u8>) {
+        /// Bits of mask pixels that are not surely near, and not surely far.
+        const NOT_NEAR: u8 = 1;
+        const NOT_FAR: u8 = 2;
+        let (across, down, width) = (self.across, self.down, self.mask.width as usize);
+        let span = |of: usize, count: usize, side: usize| {
             let scale = side as f32 / count as f32;
-            let start = (of as f32 * scale - 1.0).max(0.0) as usize;
-            start.min(side - 1)..(((of + 1) as f32 * scale + 1.0).ceil() as usize).min(side)
+            let start = (of as f32 * scale - REACH).max(0.0) as usize;
+            start.min(side - 1)..(((of + 1) as f32 * scale + REACH).ceil() as usize).min(side)
         };
-        let width = mask.width as usize;
+        spans.clear();
+        spans.extend((0..across).map(|column| span(column, across, width)));
         cells.clear();
         for row in 0..down {
-            // Column-wise extremes first, since neighbouring cells share them.
-            ends.clear();
-            ends.resize(width, [1.0, 0.0]);
-            for y in range(row, down, mask.height as usize) {
-                for ([low, high], &alpha) in ends.iter_mut().zip(&mask.alpha[y * width..][..width]) {
-                    (*low, *high) = (low.min(alpha), high.max(alpha));
+            // Column by column first, since neighbouring cells share them.
+            undecided.clear();
+            undecided.resize(width, 0);
+            for y in span(row, down, self.mask.height as usize) {
+                for (bits, &alpha) in undecided.iter_mut().zip(&self.mask.alpha[y * width..][..width]) {
+                    *bits |= if alpha > SURE { 0 } else { NOT_NEAR } | if alpha < 1.0 - SURE { 0 } else { NOT_FAR };
                 }
             }
-            cells.extend((0..across).map(|column| {
-                let ends = &ends[range(column, across, width)];
-                let [low, high] = ends.iter().fold([1.0f32, 0.0f32], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-                match () {
-                    () if low > SURE => Cell::Near,
-                    () if high < 1.0 - SURE => Cell::Far,
-                    () => Cell::Band,
-                }
-            }));
+            cells.extend(spans.iter().map(
+                |span| match undecided[span.clone()].iter().fold(0, |all, bits| all | bits) {
+                    NOT_FAR => Cell::Near,
+                    NOT_NEAR => Cell::Far,
+                    _ => Cell::Band,
+                },
+            ));
         }
     }
 
-    /// Gathers the colours of the cells in the unknown region, and within [`RADIUS`] of it.
-    #[inline(always)]
-    pub fn gather_colors(&self, cells: &[Cell], needed: &mut Vec<bool>, sums: &mut Vec<Sums>) {
-        let (across, down) = (self.across, self.down);
-        sums.clear();
-        sums.resize(across * down, Sums::NONE);
-        needed.clear();
-        needed.resize(across * down, false);
-        for row in 0..down {
-            for column in (0..across).filter(|column| cells[row * across + column] == Cell::Band) {
-                for row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(down) {
-                    let columns = column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(across);
-                    needed[row * across..][columns].fill(true);
+    /// Lists the runs of cells, except far ones, in raster order.
+    pub fn find_runs(&self, cells: &[Cell], runs: &mut Vec<Run>) {
+        runs.clear();
+        for (row, cells) in cells.chunks_exact(self.across).enumerate() {
+            let mut column = 0;
+            for alike in cells.chunk_by(|a, b| a == b) {
+                let (first, last) = (column, column + alike.len() - 1);
+                if alike[0] != Cell::Far {
+                    let xs = self.pixel_columns(first).start..self.pixel_columns(last).end;
+                    runs.push(Run { cell: alike[0], row, xs });
                 }
-            }
-        }
-        for row in 0..down {
-            for y in self.pixel_rows(row) {
-                let (alpha_at, first) = (self.mask_in_row(y), y * self.color.width as usize);
-                for column in (0..across).filter(|column| needed[row * across + column]) {
-                    let (sums, cell) = (&mut sums[row * across + column], cells[row * across + column]);
-                    // Every other pixel suffices.
-                    for x in self.pixel_columns(column).filter(|x| (x + y) % 2 == 0) {
-                        match cell {
-                            Cell::Near => sums.add(NEAR, self.light_at(first + x)),
-                            Cell::Far => sums.add(FAR, self.light_at(first + x)),
-                            Cell::Band => match alpha_at(x) {
-                                alpha if alpha > SURE => sums.add(NEAR, self.light_at(first + x)),
-                                alpha if alpha < 1.0 - SURE => sums.add(FAR, self.light_at(first + x)),
-                                _ => {}
-                            },
-                        }
-                    }
-                }
+                column = last + 1;
             }
         }
     }
 
-    /// Computes the colour contrast around a cell; `None` if a surface has too few pixels.
-    #[inline(always)]
-    pub fn compute_contrast<S: Simd>(
-        &self,
-        simd: S,
-        kernel: &Kernel,
-        sums: &[Sums],
-        (row, column): (usize, usize),
-    ) -> Option<Contrast> {
-        let mut around = Sums::NONE;
-        for other_row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(self.down) {
-            let weights = &kernel[other_row + RADIUS - row];
-            for other in column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(self.across) {
-                let sums = &sums[other_row * self.across + other];
-                around.add_weighted(simd, sums, weights[other + RADIUS - column]);
+    /// Marks the cells within `radius` of the unknown region.
+    pub fn mark_around_band(&self, cells: &[Cell], radius: usize, marked: &mut Bitmap) {
+        marked.clear((self.across, self.down));
+        for at in (0..cells.len()).filter(|&at| cells[at] == Cell::Band) {
+            for near in self.cells_within(at, radius) {
+                marked.set(near % self.across, near / self.across);
             }
         }
-        around.colors(self.backdrop.is_some()).map(Contrast::new)
+    }
+
+    /// Returns the two cells, in one direction, whose centres enclose a pixel: interpolation hides the cells.
+    #[inline(always)]
+    pub fn enclosing_cells(&self, at: usize, count: usize) -> Tap {
+        Tap::at(self.place_of(at), count)
+    }
+
+    /// Returns the place of a pixel in units of cells from the first one's centre, in one direction.
+    #[inline(always)]
+    pub fn place_of(&self, at: usize) -> f32 {
+        let half = 0.5 * self.cell_px as f32;
+        (at as f32 + 0.5 - half) / self.cell_px as f32
+    }
+
+    /// Splits pixel columns at the centres of cells; returns each part, and the two columns of cells whose centres
+    /// enclose it: the same one twice at the border.
+    #[inline(always)]
+    pub fn split_at_centres(&self, xs: Range<usize>) -> impl Iterator<Item = (Range<usize>, [usize; 2])> {
+        let (cell_px, last, mut start) = (self.cell_px, self.across - 1, xs.start);
+        std::iter::from_fn(move || {
+            let passed = (start + cell_px - cell_px / 2) / cell_px;
+            let part = start..(passed * cell_px + cell_px / 2).min(xs.end);
+            start = part.end;
+            (!part.is_empty()).then_some((part, [passed.saturating_sub(1), passed.min(last)]))
+        })
     }
 
     /// Iterates over the cells within `radius` of a cell, including itself.
@@ -230,36 +179,5 @@ impl MaskView<'_> {
         let columns = column.saturating_sub(radius)..(column + radius + 1).min(across);
         let rows = row.saturating_sub(radius)..(row + radius + 1).min(self.down);
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    struct AddWeighted<'a>(&'a mut Sums, &'a [(Sums, f32)]);
-
-    impl pulp::WithSimd for AddWeighted<'_> {
-        type Output = ();
-        #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) {
-            self.1.iter().for_each(|(sums, weight)| self.0.add_weighted(simd, sums, *weight));
-        }
-    }
-
-    #[test]
-    fn weighted_sums_are_the_same_to_the_bit_with_any_vectors() {
-        let cells: Vec<(Sums, f32)> = (0..121)
-            .map(|cell| (Sums(std::array::from_fn(|k| (cell * 31 + k * 17) as f32 / 7.0)), 1.0 / (1 + cell) as f32))
-            .collect();
-        let mut expected = [0.0; 2 * SURFACE];
-        for (sums, weight) in &cells {
-            expected.iter_mut().zip(sums.0).for_each(|(sum, value)| *sum += weight * value);
-        }
-        for arch in [pulp::Arch::Scalar, pulp::Arch::new()] {
-            let mut around = Sums::NONE;
-            arch.dispatch(AddWeighted(&mut around, &cells));
-            assert_eq!(around.0, expected);
-        }
     }
 }

@@ -1,5 +1,13 @@
 //! Posterior mean of alpha, from a mask and a colour between those of two surfaces, as a lookup table.
 
+#![allow(clippy::needless_range_loop)] // Lanes index several arrays at once.
+
+use crate::depth::matting::{fast_max, fast_min};
+
+/// Pixels looked up at once, and one number for each.
+pub const LANES: usize = 8;
+pub type Lanes = [f32; LANES];
+
 /// Number of alphas that are sampled, in steps of an eighth.
 const STEPS: usize = 9;
 /// Prior probability of a mixed pixel where the mask is undecided, uniform over alpha. It decreases with the mask's
@@ -34,19 +42,39 @@ impl Posterior {
         Self(table)
     }
 
-    /// Looks up alpha for the mask value `mask`, 0 to 1, and a colour at `place` (0: far colour, 1: near colour), whose
-    /// reciprocal variance is `precision`.
+    /// Looks up alpha for mask values, 0 to 1, and colours at `places` (0: far colour, 1: near colour), whose
+    /// reciprocal variances are `precisions`.
     #[inline(always)]
-    pub fn alpha(&self, mask: f32, place: f32, precision: f32) -> f32 {
-        // The exponent of a float is its base-2 logarithm, rounded down.
-        let exponent = (std::f32::consts::SQRT_2 * precision.max(1.0)).to_bits() >> (f32::MANTISSA_DIGITS - 1);
-        let slice = (exponent as usize - 127).min(PRECISIONS - 1);
-        let row = (mask * (MASKS - 1) as f32 + 0.5) as usize;
-        let at = ((place - MIN_PLACE) * (1.0 / STEP)).clamp(0.0, (PLACES - 1) as f32 - 1e-3);
-        let (first, along) = (at as usize, at.fract());
-        let row = &self.0[(slice * MASKS + row.min(MASKS - 1)) * PLACES..][..PLACES];
-        row[first] + (row[first + 1] - row[first]) * along
+    pub fn alphas(&self, masks: &Lanes, places: &Lanes, precisions: &Lanes) -> Lanes {
+        let (mut first, mut along) = ([0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            // The exponent of a float is its base-2 logarithm, rounded down.
+            let exponent =
+                (std::f32::consts::SQRT_2 * fast_max(precisions[k], 1.0)).to_bits() >> (f32::MANTISSA_DIGITS - 1);
+            let slice = (exponent - 127).min(PRECISIONS as u32 - 1);
+            let row = round(masks[k] * (MASKS - 1) as f32).min(MASKS as u32 - 1);
+            let place = (places[k] - MIN_PLACE) * (1.0 / STEP);
+            let place = fast_min(fast_max(place, 0.0), (PLACES - 1) as f32);
+            let before = round(place - 0.5).min(PLACES as u32 - 2);
+            first[k] = (slice * MASKS as u32 + row) * PLACES as u32 + before;
+            along[k] = place - before as i32 as f32;
+        }
+        let mut alphas = [0.0; LANES];
+        for k in 0..LANES {
+            let beside = &self.0[first[k] as usize..][..2];
+            alphas[k] = beside[0] + (beside[1] - beside[0]) * along[k];
+        }
+        alphas
     }
+}
+
+/// Returns the integer next to a number: without the checks of a conversion, which would not be vectorised. Any number
+/// that is negative or too large gives a large one.
+#[inline(always)]
+fn round(number: f32) -> u32 {
+    /// Sums with it have no fraction bits.
+    const LARGE: f32 = 1.5 * (1 << (f32::MANTISSA_DIGITS - 1)) as f32;
+    (number + LARGE).to_bits().wrapping_sub(LARGE.to_bits())
 }
 
 impl Default for Posterior {
@@ -80,14 +108,17 @@ mod tests {
     #[test]
     fn colours_decide_where_they_can_and_the_mask_where_they_cannot() {
         let posterior = Posterior::new();
-        let sharp = |mask: f32, place: f32| posterior.alpha(mask, place, 1000.0);
+        let alpha = |mask: f32, place: f32, precision: f32| {
+            posterior.alphas(&[mask; LANES], &[place; LANES], &[precision; LANES])[LANES - 1]
+        };
+        let sharp = |mask: f32, place: f32| alpha(mask, place, 1000.0);
         for mask in [0.1, 0.5, 0.9] {
             for alpha in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 // A pure pixel may be an outlier, so certainty is limited.
                 assert!((sharp(mask, alpha) - alpha).abs() < 0.15, "{mask} {alpha}");
             }
         }
-        let blunt = |mask: f32, place: f32| posterior.alpha(mask, place, 1.0);
+        let blunt = |mask: f32, place: f32| alpha(mask, place, 1.0);
         assert!(blunt(0.1, 0.5) < 0.3 && blunt(0.9, 0.5) > 0.7);
         for mask in 0..10 {
             for place in 0..20 {

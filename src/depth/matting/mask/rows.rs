@@ -1,0 +1,206 @@
+//! Alpha of the pixels in the unknown region, row by row.
+
+#![allow(clippy::needless_range_loop)] // Lanes and planes index several arrays at once.
+
+use std::ops::Range;
+
+use super::cells::{Cell, MaskView, Run};
+use super::connection::Connection;
+use super::models::{INVERSE, LINE, MODEL, Models, SURFACES};
+use super::outline::clarity;
+use super::posterior::{LANES, Lanes, Posterior};
+use super::{CONNECTED_FROM, NEAR_FROM};
+use crate::depth::matting::contrast::MAX_PRECISION;
+use crate::depth::matting::{fast_max, fast_min};
+use crate::depth::tap::Tap;
+
+/// The numbers of a row's pixels, by column, and scratch memory for the mask. Some columns more than the picture has, so
+/// that all lanes can be read and written.
+#[derive(Debug, Default)]
+pub struct RowBuffers {
+    mask_row: Vec<f32>,
+    mask: Vec<f32>,
+    light: [Vec<f32>; 3],
+    /// Light of the known background.
+    behind: [Vec<f32>; 3],
+    precision: Vec<f32>,
+    alpha: Vec<f32>,
+}
+
+impl RowBuffers {
+    fn resize(&mut self, width: usize) {
+        let Self { mask, light, behind, precision, alpha, .. } = self;
+        let planes = light.iter_mut().chain(behind);
+        planes.chain([mask, precision, alpha]).for_each(|plane| plane.resize(width + LANES, 0.0));
+    }
+}
+
+/// Returns the lanes from column `x` on.
+#[inline(always)]
+fn lanes_at(row: &[f32], x: usize) -> Lanes {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(&row[x..][..LANES]);
+    lanes
+}
+
+#[inline(always)]
+fn lanes_of([red, green, blue]: &[Vec<f32>; 3], x: usize) -> [Lanes; 3] {
+    [lanes_at(red, x), lanes_at(green, x), lanes_at(blue, x)]
+}
+
+/// Place of each lane's colour between both surfaces' (0: far, 1: near), and its reciprocal variance.
+type Discriminants = (Lanes, Lanes);
+
+impl MaskView<'_> {
+    /// Computes alpha of the pixels of all `runs` in the unknown region, and adds those that may be connected to the
+    /// near surface.
+    #[inline(always)]
+    pub fn compute_alphas(
+        &self,
+        (runs, models, posterior): (&[Run], &Models, &Posterior),
+        buffers: &mut RowBuffers,
+        alphas: &mut [f32],
+        connection: &mut Connection,
+    ) {
+        buffers.resize(self.color.width as usize);
+        for runs in runs.chunk_by(|a, b| a.row == b.row) {
+            let in_band = runs.iter().filter(|run| run.cell == Cell::Band);
+            for y in self.pixel_rows(runs[0].row) {
+                let down = self.enclosing_cells(y, self.down);
+                self.interpolate_mask_row(y, &mut buffers.mask_row);
+                for xs in in_band.clone().map(|run| run.xs.clone()) {
+                    self.read_pixels((xs.clone(), y), buffers);
+                    for (part, columns) in self.split_at_centres(xs.clone()) {
+                        self.compute_part(models, posterior, (part, &down, columns), buffers);
+                    }
+                    if let Some(given) = self.given {
+                        let given = &given.alpha[y * self.color.width as usize..];
+                        for x in xs.clone() {
+                            let alpha = &mut buffers.alpha[x];
+                            *alpha = given[x] + (*alpha - given[x]) * clarity(buffers.precision[x]);
+                        }
+                    }
+                    alphas[y * self.color.width as usize..][xs.clone()].copy_from_slice(&buffers.alpha[xs.clone()]);
+                    add_connected((xs, y), buffers, connection);
+                }
+            }
+        }
+    }
+
+    /// Reads the mask and the light of some pixels.
+    #[inline(always)]
+    fn read_pixels(&self, (xs, y): (Range<usize>, usize), buffers: &mut RowBuffers) {
+        let RowBuffers { mask_row, mask, light, behind, .. } = buffers;
+        let [red, green, blue] = light;
+        let first = y * self.color.width as usize;
+        let light = red[xs.clone()].iter_mut().zip(&mut green[xs.clone()]).zip(&mut blue[xs.clone()]);
+        for ((k, mask), ((red, green), blue)) in xs.clone().zip(&mut mask[xs.clone()]).zip(light) {
+            *mask = self.mask_at(mask_row, k);
+            [*red, *green, *blue] = self.light_at(first + k);
+        }
+        if let Some(backdrop) = self.backdrop {
+            let background_at = backdrop.light_in_row(y);
+            let [red, green, blue] = behind;
+            for x in xs {
+                [red[x], green[x], blue[x]] = background_at(x);
+            }
+        }
+    }
+
+    /// Computes alpha of pixels between the same four cell centres.
+    #[inline(always)]
+    fn compute_part(
+        &self,
+        models: &Models,
+        posterior: &Posterior,
+        (xs, down, columns): (Range<usize>, &Tap, [usize; 2]),
+        buffers: &mut RowBuffers,
+    ) {
+        let (across, step) = (self.across, 1.0 / self.cell_px as f32);
+        // With a known background, each pixel has its own discriminant.
+        let (mut line, mut front) = (None, None);
+        match self.backdrop {
+            None => line = models.beside::<{ SURFACES - LINE }>(LINE, across, down, columns),
+            Some(_) => front = models.beside::<{ MODEL - SURFACES }>(SURFACES, across, down, columns),
+        }
+        for x in xs.step_by(LANES) {
+            let first = self.place_of(x) - columns[0] as f32;
+            let mut along = [0.0; LANES];
+            for k in 0..LANES {
+                along[k] = first + step * k as f32;
+            }
+            let light = lanes_of(&buffers.light, x);
+            let mask = lanes_at(&buffers.mask, x);
+            let discriminants = match (&line, &front) {
+                (Some(line), _) => Some(discriminate(line, &along, &light)),
+                (None, Some(front)) => {
+                    let behind = lanes_of(&buffers.behind, x);
+                    Some(discriminate_against(front, &along, &light, &behind))
+                }
+                (None, None) => None,
+            };
+            let (alpha, precision) = match discriminants {
+                Some((places, precision)) => (posterior.alphas(&mask, &places, &precision), precision),
+                None => (mask, [0.0; LANES]),
+            };
+            buffers.alpha[x..][..LANES].copy_from_slice(&alpha);
+            buffers.precision[x..][..LANES].copy_from_slice(&precision);
+        }
+    }
+}
+
+/// Returns the discriminants of a line interpolated between `left` and `right`.
+#[inline(always)]
+fn discriminate<const N: usize>([left, right]: &[[f32; N]; 2], along: &Lanes, light: &[Lanes; 3]) -> Discriminants {
+    let (mut places, mut precision) = ([0.0; LANES], [0.0; LANES]);
+    for k in 0..LANES {
+        let between = |n: usize| left[n] + (right[n] - left[n]) * along[k];
+        places[k] = between(0) * light[0][k] + between(1) * light[1][k] + between(2) * light[2][k] - between(3);
+        precision[k] = between(4);
+    }
+    (places, precision)
+}
+
+/// Returns the discriminants between a surface interpolated between `left` and `right` and the light `behind` it.
+#[inline(always)]
+fn discriminate_against<const N: usize>(
+    [left, right]: &[[f32; N]; 2],
+    along: &Lanes,
+    light: &[Lanes; 3],
+    behind: &[Lanes; 3],
+) -> Discriminants {
+    const FIRST: usize = INVERSE - SURFACES;
+    let (mut places, mut precision) = ([0.0; LANES], [0.0; LANES]);
+    for k in 0..LANES {
+        let between = |n: usize| left[n] + (right[n] - left[n]) * along[k];
+        let [x, y, z] = [between(0) - behind[0][k], between(1) - behind[1][k], between(2) - behind[2][k]];
+        let [xx, xy, xz] = [between(FIRST), between(FIRST + 1), between(FIRST + 2)];
+        let [yy, yz, zz] = [between(FIRST + 3), between(FIRST + 4), between(FIRST + 5)];
+        let direction = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z];
+        let contrast = fast_max(direction[0] * x + direction[1] * y + direction[2] * z, 1e-9);
+        let mut place = 0.0;
+        for p in 0..3 {
+            place += direction[p] * (light[p][k] - behind[p][k]);
+        }
+        places[k] = place / contrast;
+        precision[k] = fast_min(2.0 * contrast, MAX_PRECISION);
+    }
+    (places, precision)
+}
+
+/// Adds the pixels of a run that may be connected to the near surface, and its seeds.
+#[inline(always)]
+fn add_connected((xs, y): (Range<usize>, usize), buffers: &RowBuffers, connection: &mut Connection) {
+    for x in xs.clone().step_by(LANES) {
+        let (mask, alpha) = (lanes_at(&buffers.mask, x), lanes_at(&buffers.alpha, x));
+        // Candidates in the lower bits, seeds in the higher ones.
+        let mut bits = [0u32; LANES];
+        for k in 0..LANES {
+            let is_seed = (alpha[k] > NEAR_FROM) & (mask[k] > NEAR_FROM);
+            bits[k] = u32::from(alpha[k] >= CONNECTED_FROM) << k | u32::from(is_seed) << (LANES + k);
+        }
+        let bits = u64::from(bits.into_iter().fold(0, |all, bits| all | bits));
+        let own = u64::MAX >> (u64::BITS as usize - LANES.min(xs.end - x));
+        connection.add((x, y), bits & own, bits >> LANES & own);
+    }
+}
