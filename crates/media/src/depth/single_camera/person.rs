@@ -111,7 +111,9 @@ fn sigmoid(value: f32) -> f32 {
 /// parabola.
 fn uncertainty(alpha: f32) -> f32 {
     let off = 2.0 * alpha - 1.0;
-    (1.0 - off * off).max(0.0).powf(0.75)
+    // The power 3/4, by roots, which take a fraction of its time.
+    let root = (1.0 - off * off).max(0.0).sqrt();
+    root * root.sqrt()
 }
 
 #[cfg(test)]
