@@ -11,13 +11,12 @@ mod known;
 mod onnx;
 mod tflite;
 
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 pub use bounded::shorten_timeouts;
 pub use known::{KNOWN_NETWORKS, KnownNetwork, Scaling, Task};
 
+use crate::files::input;
 use bokehcam::compute::catch_panic;
 
 /// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
@@ -114,7 +113,7 @@ pub struct LoadedNetwork {
 /// # Errors
 /// The file is unreadable, not a network, or has loops or operators that its runtime does not support.
 pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkError> {
-    let bytes = read(path).map_err(|source| NetworkError::Read { path: path.into(), source })?;
+    let bytes = input::read(path, MAX_BYTES).map_err(|source| NetworkError::Read { path: path.into(), source })?;
     let known = KnownNetwork::identify(&bytes);
     let refused = |why: String| NetworkError::Refused { path: path.into(), why };
     let network = load_bytes(bytes, known.is_some()).map_err(refused)?;
@@ -129,19 +128,6 @@ pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkError> {
         }
     }
     Ok(LoadedNetwork { network, known })
-}
-
-/// Reads a regular file of at most [`MAX_BYTES`]: opening a pipe would block.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if !path.metadata()?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a file"));
-    }
-    let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > MAX_BYTES {
-        true => Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it has more than {MAX_BYTES} bytes"))),
-        false => Ok(bytes),
-    }
 }
 
 /// Loads a network by the runtime for its format.
