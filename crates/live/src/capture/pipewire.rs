@@ -54,18 +54,7 @@ impl PipeWireCamera {
     /// The camera does not exist, or cannot be used.
     pub fn open(name: &str, filters: bool, request: ModeRequest, frames: Option<u64>) -> Result<Self, CaptureError> {
         let (sender, receiver) = link::live();
-        let picture_decoder = PictureDecoder {
-            request,
-            sender,
-            pictures: Pool::new(PICTURES, ColorImage::default),
-            decoder: None,
-            negotiated: None,
-            size: None,
-            scratch: ColorImage::default(),
-            fit: Letterbox::default(),
-            losses: Losses::default(),
-            warned: false,
-        };
+        let picture_decoder = PictureDecoder::new(request, sender);
         // Blocks until the camera has announced its format.
         let (reader, camera, negotiated) =
             Reader::new(name, filters, picture_decoder).map_err(|error| CaptureError::Camera(error.into()))?;
@@ -154,6 +143,21 @@ struct PictureDecoder {
 }
 
 impl PictureDecoder {
+    fn new(request: ModeRequest, sender: Sender<Picture>) -> Self {
+        Self {
+            request,
+            sender,
+            pictures: Pool::new(PICTURES, ColorImage::default),
+            decoder: None,
+            negotiated: None,
+            size: None,
+            scratch: ColorImage::default(),
+            fit: Letterbox::default(),
+            losses: Losses::default(),
+            warned: false,
+        }
+    }
+
     /// Decodes a frame and sends it; fails if it cannot be decoded.
     fn decode(&mut self, frame: &Frame) -> Result<(), String> {
         let Some((negotiated, size)) = self.negotiated.zip(self.size) else { return Ok(()) };
@@ -282,18 +286,7 @@ mod tests {
         ];
         let chosen = |request: ModeRequest| {
             let (sender, _receiver) = link::live();
-            let mut picture_decoder = PictureDecoder {
-                request,
-                sender,
-                pictures: Pool::new(0, ColorImage::default),
-                decoder: None,
-                negotiated: None,
-                size: None,
-                scratch: ColorImage::default(),
-                fit: Letterbox::default(),
-                losses: Losses::default(),
-                warned: false,
-            };
+            let mut picture_decoder = PictureDecoder::new(request, sender);
             let NegotiatedFormat { fourcc, size, rate } = picture_decoder.choose_mode(&modes).unwrap();
             format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
         };
