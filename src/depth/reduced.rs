@@ -17,7 +17,7 @@ pub struct Reducer {
     /// Square roots by code; one entry more, so that interpolation always has a next one.
     roots: Box<[f32; 257]>,
     /// Sums of the codes in a row of blocks, per column.
-    sums: Vec<u32>,
+    sums: Vec<u16>,
 }
 
 impl Default for Reducer {
@@ -92,16 +92,16 @@ impl Reducer {
         // Sums the rows of the blocks first, which is vector code.
         for y in lines.clone() {
             for (sum, &code) in self.sums.iter_mut().zip(&color.rgb[3 * y * width..]) {
-                *sum += u32::from(code);
+                *sum += u16::from(code);
             }
         }
         for block in 0..across {
             let columns = block * block_px..((block + 1) * block_px).min(width);
             let weight = 1.0 / (columns.len() * lines.len()) as f32;
             let mut sums = [0; 3];
-            for pixel in self.sums[3 * columns.start..3 * columns.end].chunks_exact(3) {
+            for pixel in &self.sums.as_chunks::<3>().0[columns] {
                 for p in 0..3 {
-                    sums[p] += pixel[p];
+                    sums[p] += u32::from(pixel[p]);
                 }
             }
             let mut roots = [0.0; 3];

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::color::srgb_to_linear_table;
 use crate::compute::thread_pool::ThreadPool;
-use crate::frame::{ColorImage, DepthMap, MixedPixel};
+use crate::frame::{ColorImage, DepthMap, MixedPixel, reset_buffer, resize_buffer};
 use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
@@ -180,12 +180,10 @@ impl BackgroundMemory {
     fn reset(&mut self, size: (usize, usize)) {
         let count = size.0 * size.1;
         self.size = size;
-        self.rgb.resize(3 * count, 0);
-        self.inverse.resize(count, 0.0);
-        self.rounds.clear();
-        self.rounds.resize(count, 0);
-        self.covering.clear();
-        self.covering.resize(count, 0.0);
+        resize_buffer(&mut self.rgb, 3 * count);
+        resize_buffer(&mut self.inverse, count);
+        reset_buffer(&mut self.rounds, count);
+        reset_buffer(&mut self.covering, count);
         self.reduced.clear();
         self.gain = [1.0; 3];
         self.assign_revision();
