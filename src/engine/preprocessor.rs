@@ -174,7 +174,9 @@ impl Preprocessor {
 
     /// Computes the CoC of the frame at `time_ns`; finishes its `map`.
     pub fn compute_coc(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        match self.check.as_mut().and_then(|check| check.check_frame(map, color)) {
+        // A map that was made around a subject was made from this picture.
+        let check = self.check.as_mut().filter(|_| map.subject_m.is_none());
+        match check.and_then(|check| check.check_frame(map, color)) {
             None => {}
             Some(Verdict::Unregistered) => {
                 self.warning = Some(

@@ -124,6 +124,19 @@ fn depth_of_a_single_picture_is_refined_if_it_does_not_fit_and_never_against_the
 }
 
 #[test]
+fn depth_that_fits_nowhere_is_told_unless_it_was_made_from_the_picture_itself() {
+    let (color, mut map) = portrait();
+    map.metres.reverse();
+    for subject_m in [None, Some(1.0)] {
+        let mut preprocessor = preprocessor(&Look::default(), Origin::Synthesized, color.size(), false);
+        for frame in 0..20 {
+            preprocessor.compute_coc(&mut DepthMap { subject_m, ..map.clone() }, &color, frame * PERIOD_NS);
+        }
+        assert_eq!(preprocessor.take_warning().is_some(), subject_m.is_none());
+    }
+}
+
+#[test]
 fn a_source_that_knows_the_background_gets_none_from_memory() {
     // The person takes a step to the right after 40 frames.
     let last_map = |background_memory, knows_background| {
