@@ -98,7 +98,7 @@ pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: u
         for channel in 0..size.channels {
             let (depth, lane) = (place * size.channels + channel, channel % size.lanes);
             let block = &mut out[depth / made.lanes * made.plane()..][..made.plane()];
-            let pixels = block.chunks_exact_mut(made.lanes).take(to).skip(from).map(|out| &mut out[depth % made.lanes]);
+            let pixels = block[depth % made.lanes..].iter_mut().step_by(made.lanes).take(to).skip(from);
             if !rows.contains(&tap) {
                 pixels.for_each(|out| *out = 0.0);
             } else if from < to {
@@ -106,7 +106,9 @@ pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: u
                     channel / size.lanes * size.plane() + (first_row + tap - rows.start) * size.columns * size.lanes;
                 let line = &input[start..][..size.columns * size.lanes];
                 let tapped = &line[(from * across.step + column - across.padding) * size.lanes..];
-                pixels.zip(tapped.chunks(across.step * size.lanes)).for_each(|(out, input)| *out = input[lane]);
+                pixels
+                    .zip(tapped[lane..].iter().step_by(across.step * size.lanes))
+                    .for_each(|(out, input)| *out = *input);
             }
         }
     }

@@ -111,9 +111,12 @@ impl Step {
                 arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
                 // Pixel shuffle: the four channels of a pixel are 2x2 pixels of the result.
                 for (y, row) in out.chunks_exact_mut(result.columns).enumerate() {
-                    for (x, value) in row.iter_mut().enumerate() {
-                        let (pixel, channel) = (y / 2 * size.columns + x / 2, 2 * (y % 2) + x % 2);
-                        *value = sums[channel / lanes * size.plane() + pixel * lanes + channel % lanes];
+                    let [left, right] = [2 * (y % 2), 2 * (y % 2) + 1].map(|channel| {
+                        let first = channel / lanes * size.plane() + channel % lanes;
+                        sums[first + y / 2 * size.columns * lanes..].iter().step_by(lanes)
+                    });
+                    for (pair, (left, right)) in row.as_chunks_mut::<2>().0.iter_mut().zip(left.zip(right)) {
+                        *pair = [*left, *right];
                     }
                 }
             }
