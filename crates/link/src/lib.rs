@@ -50,8 +50,9 @@ use crossbeam_channel::{RecvTimeoutError, SendTimeoutError};
 #[error("the next stage is gone")]
 pub struct Abandoned;
 
-/// Capacity of a lossless link: one item in progress behind one that is ready.
-pub const LOSSLESS_ITEMS: usize = 2;
+/// Capacity of a lossless link: an item that is ready while the receiver works on another. More would take memory, and
+/// no stage is faster for it.
+pub const LOSSLESS_ITEMS: usize = 1;
 
 /// Result of waiting for an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
