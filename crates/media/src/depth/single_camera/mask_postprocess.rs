@@ -32,7 +32,8 @@ pub struct MaskPostProcessor {
     persons: Vec<bool>,
     previous: Vec<bool>,
     components: Components,
-    /// Vertical sums of person pixels around a pixel, within 1 and within [`RADIUS`].
+    /// Vertical sums of person pixels around each pixel of a row, within 1 and within [`RADIUS`], from [`RADIUS`] pixels
+    /// beyond the border on.
     columns: [Vec<u8>; 2],
     /// When a person was last seen; `None` before the first frame.
     seen_ns: Option<u64>,
@@ -117,29 +118,29 @@ impl MaskPostProcessor {
     fn binarize_interior(&mut self, width: usize, alphas: &mut [f32]) {
         let Self { persons, columns, .. } = self;
         let height = persons.len() / width.max(1);
-        let clamped = |at: usize, by: usize, count: usize| (at + by).saturating_sub(RADIUS).min(count - 1);
-        for y in 0..height {
+        for (y, alphas) in alphas.chunks_exact_mut(width.max(1)).enumerate() {
             for (radius, sums) in columns.iter_mut().enumerate().map(|(k, sums)| (k + 1, sums)) {
                 sums.clear();
-                sums.resize(width, 0);
+                sums.resize(width + 2 * RADIUS, 0);
                 for by in RADIUS - radius..=RADIUS + radius {
-                    let row = &persons[clamped(y, by, height) * width..][..width];
-                    sums.iter_mut().zip(row).for_each(|(sum, &is_person)| *sum += u8::from(is_person));
+                    let row = (y + by).saturating_sub(RADIUS).min(height - 1);
+                    let row = &persons[row * width..][..width];
+                    sums[RADIUS..].iter_mut().zip(row).for_each(|(sum, &is_person)| *sum += u8::from(is_person));
                 }
+                // Beyond the border, the outermost pixels repeat.
+                let [first, last] = [sums[RADIUS], sums[RADIUS + width - 1]];
+                sums[..RADIUS].fill(first);
+                sums[RADIUS + width..].fill(last);
             }
-            let row = y * width..(y + 1) * width;
-            for (x, (alpha, &is_person)) in alphas[row.clone()].iter_mut().zip(&persons[row]).enumerate() {
-                let alike = |radius: usize| {
-                    let all = if is_person { 2 * radius as u8 + 1 } else { 0 };
-                    let sums = &columns[radius - 1];
-                    (RADIUS - radius..=RADIUS + radius).all(|by| sums[clamped(x, by, width)] == all)
-                };
-                let decided = if is_person { 1.0 } else { 0.0 };
-                *alpha = match () {
-                    () if *alpha == decided || !alike(1) => *alpha,
-                    () if alike(RADIUS) => decided,
-                    () => 0.5 * (*alpha + decided),
-                };
+            let [near, wide] = columns.each_ref().map(|sums| &sums[..width + 2 * RADIUS]);
+            let persons = &persons[y * width..][..width];
+            for (x, (alpha, &is_person)) in alphas.iter_mut().zip(persons).enumerate() {
+                let near = near[x + 1] + near[x + 2] + near[x + 3];
+                let wide = wide[x] + wide[x + 1] + wide[x + 2] + wide[x + 3] + wide[x + 4];
+                let decided = f32::from(u8::from(is_person));
+                let is_alike = |sum: u8, all: u8| sum == if is_person { all } else { 0 };
+                let halfway = if is_alike(near, 9) { 0.5 * (*alpha + decided) } else { *alpha };
+                *alpha = if is_alike(wide, 25) { decided } else { halfway };
             }
         }
     }
