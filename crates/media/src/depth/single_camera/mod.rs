@@ -12,6 +12,7 @@ mod mask_postprocess;
 mod person;
 mod picture_network;
 mod relative_depth;
+mod shrink;
 mod stillness;
 mod subject_mask;
 

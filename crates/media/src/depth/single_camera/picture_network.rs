@@ -1,9 +1,9 @@
 //! Feeds pictures to a network: input layout and scaling, and the selection of its output.
 
+use super::shrink::Shrinker;
 use super::stillness::StillnessDetector;
 use crate::network::{LoadedNetwork, Network, Port, Scaling, Task, Tensor};
 use bokehcam::frame::ColorImage;
-use bokehcam::frame::scale::RowScaler;
 
 /// Maximum side of a network's input picture, in pixels.
 const MAX_SIDE: usize = 1024;
@@ -33,9 +33,9 @@ pub struct PictureNetwork {
     recurrent_states: Vec<(usize, usize)>,
     inputs: Vec<Tensor>,
     outputs: Vec<Tensor>,
-    scale: RowScaler,
-    row: Vec<u16>,
-    scaled: Vec<u8>,
+    shrinker: Shrinker,
+    /// A row of the shrunk picture.
+    row: Vec<u8>,
     /// Detects pictures like the last one that the network ran on; `None` runs it on every picture.
     stillness: Option<StillnessDetector>,
 }
@@ -137,9 +137,8 @@ impl PictureNetwork {
             recurrent_states,
             inputs,
             outputs: Vec::new(),
-            scale: RowScaler::default(),
+            shrinker: Shrinker::default(),
             row: Vec::new(),
-            scaled: Vec::new(),
             stillness: None,
         })
     }
@@ -185,18 +184,23 @@ impl PictureNetwork {
     /// Sets the input picture for [`Self::run`].
     pub fn set_picture(&mut self, color: &ColorImage) {
         let (width, height) = self.size;
-        self.scale.set_sizes((color.width as usize, color.height as usize), self.size);
-        self.scaled.resize(3 * width, 0);
+        if self.shrinker.set_sizes((color.width as usize, color.height as usize), self.size) {
+            self.stillness.iter_mut().for_each(StillnessDetector::reset);
+        }
+        self.row.resize(3 * width, 0);
         let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
-        let factor = self.scaling.divisor.map(f32::recip);
+        let Scaling { mean, divisor } = self.scaling;
+        // The network's value of each code.
+        let scaled: [[f32; 256]; 3] =
+            std::array::from_fn(|c| std::array::from_fn(|code| (code as f32 - mean[c]) * divisor[c].recip()));
         let values = &mut self.inputs[self.picture].values;
         for y in 0..height {
-            self.scale.scale_row(&color.rgb, y, 0..width, &mut self.row, &mut self.scaled);
-            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, &self.scaled));
-            for (x, pixel) in self.scaled.as_chunks::<3>().0.iter().enumerate() {
+            self.shrinker.shrink_row(color, y, &mut self.row);
+            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, &self.row));
+            for (x, pixel) in self.row.as_chunks::<3>().0.iter().enumerate() {
                 for c in 0..3 {
                     let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
-                    values[at] = (f32::from(pixel[order[c]]) - self.scaling.mean[c]) * factor[c];
+                    values[at] = scaled[c][usize::from(pixel[order[c]])];
                 }
             }
         }
