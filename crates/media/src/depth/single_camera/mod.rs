@@ -79,7 +79,7 @@ impl SingleCamera {
     /// # Errors
     /// A network cannot be loaded, or is for another task.
     pub fn open(matte: Option<&Path>, mono: Option<&Path>, hints: &Hints) -> Result<Self, DepthError> {
-        let (mut names, mut runtime) = (Vec::new(), "");
+        let (mut names, mut runtime, mut are_known) = (Vec::new(), "", true);
         let mut load = |path: &Path, task| {
             let name = path.display().to_string();
             let failed = |why: String| DepthError::Network { name: name.clone(), why };
@@ -88,7 +88,7 @@ impl SingleCamera {
                 return Err(failed(format!("this is {}, a network for --depth {}", known.file, known.task.name())));
             }
             names.push(loaded.known.map_or_else(|| name.clone(), |known| known.file.to_owned()));
-            runtime = loaded.network.runtime;
+            (runtime, are_known) = (loaded.network.runtime, are_known && loaded.known.is_some());
             PictureNetwork::new(loaded, task, hints).map_err(failed)
         };
         let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(PersonSegmenter::new);
@@ -111,7 +111,9 @@ impl SingleCamera {
             due: DueNetworks::default(),
             has_subject,
         };
-        networks.self_test()?;
+        if !are_known {
+            networks.self_test()?;
+        }
         Ok(networks)
     }
 
@@ -120,7 +122,7 @@ impl SingleCamera {
         format!("{}, run by {}", self.name, self.runtime)
     }
 
-    /// Runs the networks on a grey picture, so that errors appear at the start.
+    /// Runs the networks on a grey picture, so that the errors of unknown ones appear at the start.
     fn self_test(&mut self) -> Result<(), DepthError> {
         let Self { name, person, relative_depth, .. } = self;
         let failed = |why| DepthError::Network { name: name.clone(), why };
