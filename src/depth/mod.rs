@@ -74,12 +74,6 @@ pub trait DepthSource: Send {
         self.inner_mut().into_iter().for_each(|inner| inner.set_focus_on_persons(on));
     }
 
-    /// Sets whether the source may return the map of an earlier picture for one that hardly differs. The initial state
-    /// is that it may not.
-    fn set_reuse(&mut self, on: bool) {
-        self.inner_mut().into_iter().for_each(|inner| inner.set_reuse(on));
-    }
-
     /// Handles a seek in the source: from now on, the source's own time is ahead of media time by `ahead_ns`
     /// nanoseconds, and the scene may be a different one.
     fn seek(&mut self, ahead_ns: i64) {

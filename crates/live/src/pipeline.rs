@@ -107,8 +107,7 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
         RunInfo { source: info.name.clone(), sink: sink.describe(), budget_ns: run.budget_ns, ..RunInfo::default() };
 
     let capture = capture::Stage::new(run.camera, run.demand, stop, &shared, decode);
-    let depth =
-        depth::Stage::new((preprocessor, run.look.reuse), run.depth, (run.changes, run.adaptive), &shared, of_depth);
+    let depth = depth::Stage::new(preprocessor, run.depth, (run.changes, run.adaptive), &shared, of_depth);
     let blur = blur::Stage::new(blur, run.output_request.filter(|_| !run.mirror), run.budget_ns, &shared, of_blur);
     let deliver = deliver::Stage::new(sink, (run.view, run.progress), run.mirror, &shared, of_sink);
     let ((to_depth, from_capture), (to_blur, from_depth), (to_sink, from_blur)) =

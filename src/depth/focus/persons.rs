@@ -169,11 +169,6 @@ impl DepthSource for PersonFocus {
         self.is_enabled = on;
     }
 
-    fn set_reuse(&mut self, on: bool) {
-        self.persons.detector.set_reuse(on);
-        self.depth.set_reuse(on);
-    }
-
     fn seek(&mut self, ahead_ns: i64) {
         self.persons.last_ns = None;
         self.persons.detector.seek(ahead_ns);

@@ -16,7 +16,6 @@ use bokehcam::engine::{Composed, Preprocessor};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::pool::Pooled;
 use bokehcam::link::{Received, Receiver, Sender};
-use bokehcam::look::Reuse;
 use bokehcam::optics::CocField;
 
 /// After this time without a frame there are no viewers, and a depth camera may pause.
@@ -39,8 +38,6 @@ pub(super) struct Stage<'a> {
     source: Option<Box<dyn DepthSource>>,
     /// The changes of the blur, and whether executors support every quality.
     changes: (Option<mpsc::Receiver<Change>>, bool),
-    /// Whether results of earlier frames may serve.
-    reuse: Reuse,
     /// Effort and rate of depth; `None` computes full-effort depth for every frame.
     scheduler: Option<DepthScheduler<'a>>,
     shared: &'a Shared,
@@ -57,14 +54,14 @@ type Made = (Option<Pooled<DepthMap>>, CocField);
 
 impl<'a> Stage<'a> {
     pub(super) fn new(
-        (preprocessor, reuse): (Preprocessor, Reuse),
+        preprocessor: Preprocessor,
         source: Option<Box<dyn DepthSource>>,
         changes: (Option<mpsc::Receiver<Change>>, bool),
         shared: &'a Shared,
         times: &'a mut DepthTimings,
     ) -> Self {
         let scheduler = shared.realtime_period_ns.map(|_| DepthScheduler::new(&shared.plan));
-        Self { preprocessor, source, changes, reuse, scheduler, shared, times, change: (0, false), swap: None, seek: 0 }
+        Self { preprocessor, source, changes, scheduler, shared, times, change: (0, false), swap: None, seek: 0 }
     }
 
     /// Runs until the input ends or the output is closed. Changes of the blur take effect between frames.
@@ -124,7 +121,6 @@ impl<'a> Stage<'a> {
         let (changes, adaptive) = &self.changes;
         for Change { number, look, bokeh } in changes.iter().flat_map(mpsc::Receiver::try_iter) {
             self.preprocessor.set_look(&look);
-            self.reuse = look.reuse;
             self.change = (number, matches!(bokeh, ExecutorChange::KeepUntilReady));
             self.scheduler.iter_mut().for_each(DepthScheduler::discard_held_depth);
             if let ExecutorChange::Replace(executor) = bokeh {
@@ -134,10 +130,8 @@ impl<'a> Stage<'a> {
             }
         }
         let finds_subject = self.preprocessor.focuses_on_subject();
-        let reuses = self.reuse.is_on(self.shared.realtime_period_ns.is_some());
         if let Some(source) = &mut self.source {
             source.set_focus_on_persons(finds_subject);
-            source.set_reuse(reuses);
         }
     }
 

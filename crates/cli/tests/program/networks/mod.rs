@@ -152,30 +152,79 @@ fn without_a_person_nothing_is_as_near_as_one() {
     assert!(nearest_m > 1.05 * DepthMap::SUBJECT_M && map.farthest_m() > Some(nearest_m), "{nearest_m}");
 }
 
-/// With reuse, pictures that hardly differ share a map, and a change of the picture is followed at once.
+/// Draws a disc at column `x` with sensor noise of one code, another in every frame.
+fn noisy_disc(x: f32, frame: u64) -> ColorImage {
+    let (mut color, _) = disc(320, 240, (x, 118.0), 60.0);
+    for (at, code) in color.rgb.iter_mut().enumerate().filter(|(at, _)| (at + frame as usize).is_multiple_of(7)) {
+        *code = code.saturating_add(u8::from(at % 2 == 0));
+    }
+    color
+}
+
+/// Pictures that hardly differ share a map, and a change of the picture is followed at once.
 #[test]
 fn still_pictures_share_a_map_and_moved_ones_do_not() {
     let folder = TempDir::new().unwrap();
     let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
-    let (mut reusing, mut fresh) = (camera(&person), camera(&person));
-    reusing.set_reuse(true);
+    let (mut kept, mut fresh) = (camera(&person), camera(&person));
     let mut frame = 0;
-    let mut read_both = |x: f32, flicker: u8| {
-        let (mut color, _) = disc(320, 240, (x, 118.0), 60.0);
+    let mut read_both = |x: f32| {
         frame += 1;
-        // Sensor noise of one code, another in every frame.
-        for (at, code) in color.rgb.iter_mut().enumerate().filter(|(at, _)| (at + frame as usize).is_multiple_of(7)) {
-            *code = code.saturating_add(flicker * u8::from(at % 2 == 0));
+        let color = noisy_disc(x, frame);
+        let mut changed = color.clone();
+        // The network does not look at green.
+        for y in 0..40 {
+            let corner = &mut changed.rgb[y * 960..][..120];
+            corner.iter_mut().skip(1).step_by(3).for_each(|green| *green += 60 * (frame % 2) as u8);
         }
-        (read(&mut reusing, &color, frame), read(&mut fresh, &color, frame))
+        (read(&mut kept, &color, frame), read(&mut fresh, &changed, frame))
     };
-    let still: Vec<(DepthMap, DepthMap)> = (0..12).map(|_| read_both(160.0, 1)).collect();
-    assert!(still[2..].iter().all(|(reused, _)| *reused == still[2].0), "one map for all");
+    let still: Vec<(DepthMap, DepthMap)> = (0..12).map(|_| read_both(160.0)).collect();
+    assert!(still[2..].iter().all(|(kept, _)| *kept == still[2].0), "one map for all");
     assert!(still[2..].iter().any(|(_, fresh)| *fresh != still[2].1), "noise changes the fresh ones");
     for step in 1..8 {
-        let (reused, fresh) = read_both(160.0 + 2.0 * step as f32, 1);
-        let apart = reused.metres.iter().zip(&fresh.metres).filter(|(a, b)| a != b).count();
+        let (kept, fresh) = read_both(160.0 + 2.0 * step as f32);
+        let apart = kept.metres.iter().zip(&fresh.metres).filter(|(a, b)| a != b).count();
         assert!(apart < 40, "step {step}: {apart} pixels of an outline of 380");
+    }
+}
+
+/// A person who moves by half a pixel from picture to picture never gets an earlier mask.
+#[test]
+fn a_moving_person_never_gets_the_map_of_an_earlier_picture() {
+    let folder = TempDir::new().unwrap();
+    let mut camera = camera(&written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0)));
+    let mut before = DepthMap::default();
+    for frame in 0..60 {
+        let map = read(&mut camera, &noisy_disc(140.0 + 0.5 * frame as f32, frame), frame);
+        assert!(map != before, "frame {frame}");
+        before = map;
+    }
+}
+
+/// Nothing is kept across a seek, a change of size, and a cut.
+#[test]
+fn another_scene_gets_a_map_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    for change in ["none", "seek", "size", "cut", "gap"] {
+        let mut kept = camera(&person);
+        let still: Vec<DepthMap> = (0..6).map(|frame| read(&mut kept, &noisy_disc(160.0, frame), frame)).collect();
+        assert!(still[5] == still[4], "{change}: kept before");
+        let mut color = noisy_disc(160.0, 6);
+        match change {
+            "seek" => kept.seek(0),
+            "size" => color = disc(640, 480, (320.0, 236.0), 120.0).0,
+            "cut" => color = noisy_disc(220.0, 6),
+            _ => {}
+        }
+        let map = read(&mut kept, &color, if change == "gap" { 60 } else { 6 });
+        assert_eq!(map == still[5], change == "none", "{change}");
+        if change != "none" {
+            let anew = read(&mut camera(&person), &color, 6);
+            let apart = map.metres.iter().zip(&anew.metres).filter(|(a, b)| a != b).count();
+            assert!(map.size() == anew.size() && apart < 40, "{change}: {apart} pixels");
+        }
     }
 }
 

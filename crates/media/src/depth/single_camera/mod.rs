@@ -253,10 +253,6 @@ impl DepthSource for SingleCamera {
         self.is_live = true;
     }
 
-    fn set_reuse(&mut self, on: bool) {
-        self.person.iter_mut().for_each(|person| person.set_reuse(on));
-    }
-
     fn seek(&mut self, _: i64) {
         self.last_ns = None;
     }

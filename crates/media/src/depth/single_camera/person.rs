@@ -43,11 +43,6 @@ impl PersonSegmenter {
         self.seen_ns = None;
     }
 
-    /// Sets whether the mask of an earlier picture serves for one that hardly differs.
-    pub fn set_reuse(&mut self, on: bool) {
-        self.picture_network.set_reuse(on);
-    }
-
     /// Returns whether the mask of an earlier picture served for the last one.
     pub fn is_still(&self) -> bool {
         self.is_still

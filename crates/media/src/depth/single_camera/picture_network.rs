@@ -120,6 +120,9 @@ impl PictureNetwork {
             _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
         });
         let inputs = first_inputs.collect();
+        // A network with a memory gets every picture.
+        let is_skippable = task == Task::Matte && recurrent_states.is_empty();
+        let stillness = is_skippable.then(|| StillnessDetector::new((width, height)));
         let usual_scaling = match task {
             Task::Matte => Scaling::UNIT,
             Task::Mono => Scaling::IMAGENET,
@@ -139,7 +142,7 @@ impl PictureNetwork {
             outputs: Vec::new(),
             shrinker: Shrinker::default(),
             row: Vec::new(),
-            stillness: None,
+            stillness,
         })
     }
 
@@ -149,13 +152,6 @@ impl PictureNetwork {
             self.inputs[input].values.fill(0.0);
         }
         self.stillness.iter_mut().for_each(StillnessDetector::reset);
-    }
-
-    /// Sets whether [`Self::is_still`] looks for pictures that hardly differ.
-    pub fn set_reuse(&mut self, on: bool) {
-        if self.stillness.is_some() != on {
-            self.stillness = on.then(|| StillnessDetector::new(self.size));
-        }
     }
 
     /// Whether the picture that was set hardly differs from the last one for which this returned false, so that the
