@@ -12,7 +12,7 @@ use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::thread::{self, JoinHandle};
+use std::thread::{self, JoinHandle, Thread};
 
 use placement::{Placement, current_cpu};
 
@@ -26,7 +26,7 @@ pub struct ThreadPool {
 }
 
 struct Shared {
-    /// `epoch << 16 | open << 15 | workers at work`. Opening a pass increments the epoch.
+    /// `epoch << 16 | open << 15 | caller sleeps << 14 | workers at work`. Opening a pass increments the epoch.
     gate: AtomicU64,
     /// Valid from the opening of the gate until it is closed and no worker is at work.
     work: UnsafeCell<Option<Pass>>,
@@ -38,10 +38,12 @@ struct Shared {
     placements: Box<[Placement]>,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Pass {
     work: Work<'static>,
     parts: usize,
+    /// Woken by the last worker if it sleeps.
+    caller: Thread,
 }
 
 /// Start of an array of scratch memory or items.
@@ -59,10 +61,13 @@ impl<S> BasePtr<S> {
 /// Largest number of items of a pass: they are kept on the stack.
 pub const MAX_ITEMS: usize = 32;
 const OPEN: u64 = 1 << 15;
-const WORKERS_MASK: u64 = OPEN - 1;
+const CALLER_SLEEPS: u64 = 1 << 14;
+const WORKERS_MASK: u64 = CALLER_SLEEPS - 1;
 const EPOCH: u64 = 1 << 16;
 /// Spins before a worker sleeps: about the time between two passes of a frame.
 const SPINS: u32 = 4_000;
+/// Spins before the caller sleeps until the last worker leaves a pass: about as long as it takes to sleep and wake up.
+const CALLER_SPINS: u32 = 200;
 
 // SAFETY: `work` is written only by the thread in `run_workers` (`&mut self`: there is only one) while the gate is
 // closed and no worker is at work, and read only by workers that entered through the open gate; its release/acquire
@@ -170,7 +175,8 @@ impl ThreadPool {
         shared.next.store(0, Ordering::Relaxed);
         // SAFETY: the gate is closed and no worker is at work (see the wait below), so no other thread touches the
         // cell.
-        unsafe { *shared.work.get() = Some(Pass { work, parts }) };
+        let pass = Pass { work, parts, caller: thread::current() };
+        unsafe { *shared.work.get() = Some(pass.clone()) };
         let own = current_cpu();
         shared.placements.iter().take(parts - 1).for_each(|placement| placement.keep_off(own));
         // Release: workers that see the gate open also see the pass.
@@ -178,13 +184,18 @@ impl ThreadPool {
         shared.gate.store((closed & !(EPOCH - 1)).wrapping_add(EPOCH) | OPEN, Ordering::Release);
         self.workers.iter().take(parts - 1).for_each(|worker| worker.thread().unpark());
 
-        shared.run_parts(0, Pass { work, parts });
+        shared.run_parts(0, &pass);
         shared.gate.fetch_and(!OPEN, Ordering::Relaxed);
-        let mut turns = 0u32;
+        let mut turns = 0;
         // Acquire: the workers' writes are visible once their leaving is.
         while shared.gate.load(Ordering::Acquire) & WORKERS_MASK != 0 {
             turns += 1;
-            if turns.is_multiple_of(64) { thread::yield_now() } else { std::hint::spin_loop() }
+            if turns < CALLER_SPINS {
+                std::hint::spin_loop();
+            } else if shared.gate.fetch_or(CALLER_SLEEPS, Ordering::Relaxed) & WORKERS_MASK != 0 {
+                // The last worker to leave sees the bit.
+                thread::park();
+            }
         }
         // SAFETY: the gate is closed and no worker is at work.
         unsafe { *shared.work.get() = None };
@@ -222,17 +233,22 @@ impl Shared {
             placement.allow_again();
             // SAFETY: entered through the open gate, so `run_workers` neither writes the cell nor returns until this
             // worker leaves.
-            if let Some(pass) = unsafe { *self.work.get() } {
-                self.run_parts(worker, pass);
-            }
+            let pass = unsafe { (*self.work.get()).clone() };
+            let caller = pass.map(|pass| {
+                self.run_parts(worker, &pass);
+                pass.caller
+            });
             // Release: `run_workers` sees this worker's writes once it sees the worker leave.
-            self.gate.fetch_sub(1, Ordering::Release);
+            let before = self.gate.fetch_sub(1, Ordering::Release);
+            if before & (CALLER_SLEEPS | WORKERS_MASK) == CALLER_SLEEPS | 1 {
+                caller.iter().for_each(Thread::unpark);
+            }
         }
     }
 
     /// Runs parts of a pass until none is left; records a panic instead of propagating it. The parts after one that
     /// panicked are run, too: the other workers may be asleep.
-    fn run_parts(&self, worker: usize, pass: Pass) {
+    fn run_parts(&self, worker: usize, pass: &Pass) {
         loop {
             let part = self.next.fetch_add(1, Ordering::Relaxed);
             if part >= pass.parts {

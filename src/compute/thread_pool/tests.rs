@@ -33,6 +33,30 @@ fn every_item_goes_to_one_thread_with_scratch_of_its_own() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "Miri has no clock of a thread")]
+fn the_caller_sleeps_while_a_worker_is_busy() {
+    use rustix::time::{ClockId, clock_gettime};
+    use std::time::Duration;
+
+    let mut workers = ThreadPool::new("test", 2);
+    let (caller, is_busy) = (thread::current().id(), AtomicBool::new(false));
+    let before = clock_gettime(ClockId::ThreadCPUTime);
+    workers.run(2, &|_| {
+        if thread::current().id() == caller {
+            while !is_busy.load(Ordering::Relaxed) {
+                thread::sleep(Duration::from_millis(1));
+            }
+        } else {
+            is_busy.store(true, Ordering::Relaxed);
+            thread::sleep(Duration::from_millis(300));
+        }
+    });
+    let after = clock_gettime(ClockId::ThreadCPUTime);
+    let ms = (after.tv_sec - before.tv_sec) * 1000 + (after.tv_nsec - before.tv_nsec) / 1_000_000;
+    assert!(ms < 100, "{ms} ms of processor time");
+}
+
+#[test]
 fn a_panic_in_a_part_reaches_the_caller_and_the_pool_lives_on() {
     let mut workers = ThreadPool::new("test", 3);
     let result = catch_unwind(AssertUnwindSafe(|| workers.run(8, &|part| assert_ne!(part, 5))));
