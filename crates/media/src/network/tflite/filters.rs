@@ -87,28 +87,45 @@ impl Pointwise<'_> {
 }
 
 /// Unfolds the inputs of one output row (im2col): every tap becomes a channel, so that the filter is a pointwise
-/// convolution. Values of `out` that are never written must be 0 (padding of channels).
-pub fn im2col_row(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, made: &Size, out: &mut [f32]) {
+/// convolution. Values of `out` that are never written must be 0 (padding of channels), and so must those of `line`,
+/// a row with padding at both ends ([`Axis::padded_len`]).
+pub fn im2col_row(
+    input: &[f32],
+    size: &Size,
+    [down, across]: &[Axis; 2],
+    row: usize,
+    made: &Size,
+    line: &mut [f32],
+    out: &mut [f32],
+) {
     let (rows, first_row) = down.taps_inside(row, size.rows);
-    let taps = (0..down.taps).flat_map(|tap| (0..across.taps).map(move |column| (tap, column)));
-    for (place, (tap, column)) in taps.enumerate() {
-        // The outputs for which this tap is within the picture.
-        let from = across.padding.saturating_sub(column).div_ceil(across.step);
-        let to = (size.columns + across.padding).saturating_sub(column).div_ceil(across.step).min(made.columns);
-        for channel in 0..size.channels {
-            let (depth, lane) = (place * size.channels + channel, channel % size.lanes);
-            let block = &mut out[depth / made.lanes * made.plane()..][..made.plane()];
-            let pixels = block[depth % made.lanes..].iter_mut().step_by(made.lanes).take(to).skip(from);
-            if !rows.contains(&tap) {
-                pixels.for_each(|out| *out = 0.0);
-            } else if from < to {
-                let start =
-                    channel / size.lanes * size.plane() + (first_row + tap - rows.start) * size.columns * size.lanes;
-                let line = &input[start..][..size.columns * size.lanes];
-                let tapped = &line[(from * across.step + column - across.padding) * size.lanes..];
-                pixels
-                    .zip(tapped[lane..].iter().step_by(across.step * size.lanes))
-                    .for_each(|(out, input)| *out = *input);
+    let row_len = size.columns * size.lanes;
+    for (tap, block) in (0..down.taps).flat_map(|tap| (0..size.blocks()).map(move |block| (tap, block))) {
+        let inside = &mut line[across.padding * size.lanes..][..row_len];
+        if rows.contains(&tap) {
+            let start = block * size.plane() + (first_row + tap - rows.start) * row_len;
+            inside.copy_from_slice(&input[start..][..row_len]);
+        } else {
+            inside.fill(0.0);
+        }
+        let channels = size.lanes.min(size.channels - block * size.lanes);
+        // In a single block without unused channels, all values under a row of the filter are adjacent.
+        let (runs, run) = match size.lanes == size.channels {
+            true => (1, across.taps * channels),
+            false => (across.taps, channels),
+        };
+        for column in 0..runs {
+            let (mut depth, mut from) = ((tap * across.taps + column) * size.channels + block * size.lanes, 0);
+            while from < run {
+                let lane = depth % made.lanes;
+                let count = (made.lanes - lane).min(run - from);
+                let pixels = out[depth / made.lanes * made.plane()..][..made.plane()].chunks_exact_mut(made.lanes);
+                let places = (column * size.lanes + from..).step_by(across.step * size.lanes);
+                for (pixel, place) in pixels.zip(places) {
+                    let values = pixel[lane..][..count].iter_mut().zip(&line[place..][..count]);
+                    values.for_each(|(out, value)| *out = *value);
+                }
+                (depth, from) = (depth + count, from + count);
             }
         }
     }

@@ -94,10 +94,11 @@ impl Step {
             }
             Operation::Pointwise { weights, bias, unfolded: Some((axes, unfolded)) } => {
                 let (pixels, row_len) = (unfolded.pixels(), unfolded.plane());
-                let input_row = &mut scratch[..unfolded.len()];
-                input_row.fill(0.0);
+                let line = axes[1].padded_len(size.columns, unfolded.columns) * size.lanes;
+                scratch[..unfolded.len() + line].fill(0.0);
+                let (input_row, line) = scratch[..unfolded.len() + line].split_at_mut(unfolded.len());
                 for row in 0..result.rows {
-                    im2col_row(input, &size, axes, row, unfolded, input_row);
+                    im2col_row(input, &size, axes, row, unfolded, line, input_row);
                     let out = &mut out[row * row_len..];
                     arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
                 }

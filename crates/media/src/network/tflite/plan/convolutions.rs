@@ -18,7 +18,7 @@ impl Planner<'_> {
         let alone = size.lanes == self.lanes && [down, across, steps.down, steps.across] == [1; 4];
         let row = Size { rows: 1, columns, channels: depth, lanes: self.lanes };
         if !alone {
-            self.reserve_scratch(row.len())?;
+            self.reserve_scratch(row.len() + axes[1].padded_len(size.columns, columns) * size.lanes)?;
         }
         let operation = Operation::Pointwise { weights, bias, unfolded: (!alone).then_some((axes, row)) };
         Ok(Some(Planned { operation, size: Size { rows, columns, channels: out, ..size }, work: depth }))
