@@ -34,8 +34,8 @@ pub struct PictureNetwork {
     inputs: Vec<Tensor>,
     outputs: Vec<Tensor>,
     shrinker: Shrinker,
-    /// A row of the shrunk picture.
-    row: Vec<u8>,
+    /// The shrunk picture, 8-bit RGB.
+    shrunk: Vec<u8>,
     /// Detects pictures like the last one that the network ran on; `None` runs it on every picture.
     stillness: Option<StillnessDetector>,
 }
@@ -141,7 +141,7 @@ impl PictureNetwork {
             inputs,
             outputs: Vec::new(),
             shrinker: Shrinker::default(),
-            row: Vec::new(),
+            shrunk: vec![0; 3 * width * height],
             stillness,
         })
     }
@@ -165,6 +165,7 @@ impl PictureNetwork {
     /// # Errors
     /// The runtime fails, or the output is no picture of finite numbers.
     pub fn run(&mut self) -> Result<NetworkOutput<'_>, String> {
+        self.fill_input();
         self.network.run(&self.inputs, &mut self.outputs)?;
         for &(input, output) in &self.recurrent_states {
             std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
@@ -179,25 +180,27 @@ impl PictureNetwork {
 
     /// Sets the input picture for [`Self::run`].
     pub fn set_picture(&mut self, color: &ColorImage) {
-        let (width, height) = self.size;
         if self.shrinker.set_sizes((color.width as usize, color.height as usize), self.size) {
             self.stillness.iter_mut().for_each(StillnessDetector::reset);
         }
-        self.row.resize(3 * width, 0);
+        for (y, row) in self.shrunk.chunks_exact_mut(3 * self.size.0).enumerate() {
+            self.shrinker.shrink_row(color, y, row);
+            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, row));
+        }
+    }
+
+    /// Converts the picture to the network's values and layout.
+    fn fill_input(&mut self) {
         let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
         let Scaling { mean, divisor } = self.scaling;
-        // The network's value of each code.
-        let scaled: [[f32; 256]; 3] =
-            std::array::from_fn(|c| std::array::from_fn(|code| (code as f32 - mean[c]) * divisor[c].recip()));
-        let values = &mut self.inputs[self.picture].values;
-        for y in 0..height {
-            self.shrinker.shrink_row(color, y, &mut self.row);
-            self.stillness.iter_mut().for_each(|stillness| stillness.add_row(y, &self.row));
-            for (x, pixel) in self.row.as_chunks::<3>().0.iter().enumerate() {
-                for c in 0..3 {
-                    let at = if self.is_planar { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
-                    values[at] = scaled[c][usize::from(pixel[order[c]])];
-                }
+        let (pixels, values) = (self.shrunk.as_chunks::<3>().0, &mut self.inputs[self.picture].values);
+        for c in 0..3 {
+            let scaled: [f32; 256] = std::array::from_fn(|code| (code as f32 - mean[c]) * divisor[c].recip());
+            let codes = pixels.iter().map(|pixel| scaled[usize::from(pixel[order[c]])]);
+            if self.is_planar {
+                values[c * pixels.len()..].iter_mut().zip(codes).for_each(|(value, scaled)| *value = scaled);
+            } else {
+                values.as_chunks_mut::<3>().0.iter_mut().zip(codes).for_each(|(value, scaled)| value[c] = scaled);
             }
         }
     }
