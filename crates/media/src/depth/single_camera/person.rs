@@ -7,6 +7,8 @@ use bokehcam::frame::{ColorImage, Mask};
 /// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
 const PREVIOUS_WEIGHT: f32 = 0.8;
 const FRAME_NS: f32 = 1e9 / 30.0;
+/// Lower mask values are 0: those of a sure network are so small that arithmetic with them is slow.
+const MIN_ALPHA: f32 = 1e-6;
 
 /// Computes the person mask from frame to frame.
 pub struct PersonSegmenter {
@@ -91,11 +93,12 @@ fn previous_weight(gap_ns: u64) -> f32 {
 /// Returns the mask value: of two channels, the second one is the person.
 fn decode_alpha(output: &NetworkOutput, pixel: usize, is_logits: bool) -> f32 {
     let own = output.at(pixel, output.channels - 1);
-    match (is_logits, output.channels) {
-        (false, _) => own.clamp(0.0, 1.0),
+    let alpha = match (is_logits, output.channels) {
+        (false, _) => own.min(1.0),
         (true, 1) => sigmoid(own),
         (true, _) => sigmoid(own - output.at(pixel, 0)),
-    }
+    };
+    if alpha < MIN_ALPHA { 0.0 } else { alpha }
 }
 
 fn sigmoid(value: f32) -> f32 {
