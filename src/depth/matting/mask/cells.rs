@@ -10,8 +10,8 @@ use crate::frame::{ColorImage, Mask};
 /// Mask value from which a pixel is surely near; below 1 minus this, it is surely far.
 pub const SURE: f32 = 0.95;
 
-/// Mask pixels up to this distance from a cell count for its label, in mask pixels: half a pixel reaches all between which
-/// its pixels are interpolated, and the rest allows for errors of the mask's outline.
+/// Mask pixels up to this distance from a cell count for its label, in mask pixels: half a pixel reaches all between
+/// which its pixels are interpolated, and the rest allows for errors of the mask's outline.
 const REACH: f32 = 0.75;
 
 /// Trimap label of a cell.

@@ -56,8 +56,8 @@ impl Sums {
         }
     }
 
-    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background, the far colour is just
-    /// its noise.
+    /// Returns both surfaces' colours; `None` if one has too few pixels. With a known background, the far colour is
+    /// just its noise.
     #[inline(always)]
     fn colors(&self, is_background_known: bool) -> Option<[Color; 2]> {
         let noise = Color { mean: [0.0; 3], covariance: [NOISE, 0.0, 0.0, NOISE, 0.0, NOISE] };

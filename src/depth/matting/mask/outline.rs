@@ -9,8 +9,8 @@ const REACH_PX: usize = 8;
 const UNDECIDED: std::ops::Range<f32> = 0.05..0.95;
 /// Largest width of the undecided edge of a sharp mask, in pixels, about.
 const SHARP_PX: usize = 4;
-/// Separation of both surfaces' colours, in standard deviations: up to the first the mask decides, from the second on the
-/// colours do.
+/// Separation of both surfaces' colours, in standard deviations: up to the first the mask decides, from the second on
+/// the colours do.
 const UNCLEAR: f32 = 2.0;
 const CLEAR: f32 = 4.0;
 

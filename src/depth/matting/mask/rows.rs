@@ -14,8 +14,8 @@ use crate::depth::matting::contrast::MAX_PRECISION;
 use crate::depth::matting::{fast_max, fast_min};
 use crate::depth::tap::Tap;
 
-/// The numbers of a row's pixels, by column, and scratch memory for the mask. Some columns more than the picture has, so
-/// that all lanes can be read and written.
+/// The numbers of a row's pixels, by column, and scratch memory for the mask. Some columns more than the picture has,
+/// so that all lanes can be read and written.
 #[derive(Debug, Default)]
 pub struct RowBuffers {
     mask_row: Vec<f32>,
