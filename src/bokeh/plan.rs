@@ -54,6 +54,8 @@ pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
 /// The bins stay the same from frame to frame if content of at least this radius, in pixels, still fits them.
 const MIN_KEPT_RADIUS_PX: f32 = 5.0;
+/// Largest ratio of the radii of a bin whose discs are summed.
+const MAX_DISC_RATIO: f32 = 1.12;
 /// Up to this fraction of the picture may be blurred by more than [`SHARP_PX`](super::split::SHARP_PX) in a bin in focus
 /// that is shown as it is.
 const MAX_DEFOCUSED_FRACTION: f32 = 0.0005;
@@ -290,10 +292,13 @@ impl Plan {
         }
     }
 
-    /// Returns the aperture as discs, if a bin may be summed instead of filtered: if all its radii are large enough.
+    /// Returns the aperture as discs, if a bin may be summed instead of filtered: if its radii are large enough, and hardly
+    /// differ, as discs of whole pixels change in steps.
     pub fn discs(&self, bin: &Bin) -> Option<&DiscBank> {
         let min_px = compensated_radius_px(bin.min_radius_px, bin.scale);
-        self.ladder.discs.as_ref().filter(|_| min_px >= disc::MIN_RADIUS_PX && self.compositing != Compositing::Gather)
+        let is_even = min_px * MAX_DISC_RATIO >= bin.max_radius_px;
+        let is_round = min_px >= disc::MIN_RADIUS_PX && self.compositing != Compositing::Gather;
+        self.ladder.discs.as_ref().filter(|_| is_even && is_round)
     }
 
     /// Returns the index of the bin in focus, if none of its content is blurred visibly, nor hidden by something in

@@ -9,7 +9,7 @@ use pulp::Simd;
 
 use super::blur::Strip;
 use super::rows::{COPY_WIDTH, STRIP, STRIP_ROW};
-use crate::bokeh::disc::{DiscBank, MAX_HALF_WIDTH};
+use crate::bokeh::disc::{ColumnRun, DiscBank, MAX_HALF_WIDTH};
 use crate::bokeh::plan::{CELL, SEGMENT};
 use crate::compute::simd::madd;
 
@@ -67,7 +67,7 @@ impl Strip<'_> {
         let sums = &mut scratch.sums.as_chunks_mut::<C>().0[..rows * P];
         let lines = &mut scratch.lines[..LINES * 4 * C];
         // The largest power of two at which no value and no sum overflows.
-        let (_, pixels) = discs.kernel(self.max_radius_px);
+        let pixels = discs.max_pixels(self.max_radius_px);
         let steps = MAX_STEPS.min((i32::MAX as f32) / (1.1 * pixels)) / max_light;
         let steps = f32::from_bits(steps.to_bits() & f32::INFINITY.to_bits());
         let smoothing = discs.smoothing(self.max_radius_px);
@@ -154,33 +154,20 @@ impl Strip<'_> {
         let edges = self.edges.at(self.strip, y);
         let out = &mut self.out[y * STRIP_ROW..][..STRIP_ROW];
         for segment in 0..STRIP / SEGMENT {
-            let (runs, pixels) = discs.kernel(0.5 * (edges[segment][0] + edges[segment + 1][0]));
             let first = (C - STRIP) / 2 + segment * SEGMENT;
-            let scale = unit / pixels;
-            for half in (0..SEGMENT).step_by(lanes::<S>() * S::U32_LANES) {
-                let zero = simd.splat_u32s(0);
-                let mut totals = [[zero; 2]; P];
-                for run in runs {
-                    let at = (first + half).wrapping_add_signed(isize::from(run.offset));
-                    let top = (y as isize + isize::from(run.half_height)) as usize & (rows - 1);
-                    let bottom = (y as isize - isize::from(run.half_height) - 1) as usize & (rows - 1);
-                    let (top, bottom) = (&sums[top * P..][..P], &sums[bottom * P..][..P]);
-                    for p in 0..P {
-                        let (top, bottom) = (&top[p][at..], &bottom[p][at..]);
-                        for lane in 0..lanes::<S>() {
-                            let at = lane * S::U32_LANES;
-                            let (top, bottom) = (load::<S>(top, at), load::<S>(bottom, at));
-                            totals[p][lane] = simd.sub_u32s(simd.add_u32s(totals[p][lane], top), bottom);
-                        }
-                    }
-                }
-                for p in 0..P {
-                    for lane in 0..lanes::<S>() {
-                        let x = segment * SEGMENT + half + lane * S::U32_LANES;
+            let radius_px = 0.5 * (edges[segment][0] + edges[segment + 1][0]);
+            for (disc, (runs, weight)) in discs.kernel(radius_px).enumerate() {
+                for half in (0..SEGMENT).step_by(lanes::<S>() * S::U32_LANES) {
+                    let totals = sum_runs::<S, P, C>(simd, runs, (y, rows), first + half, sums);
+                    for (p, totals) in totals.iter().enumerate() {
+                        let out = &mut out[p * STRIP + segment * SEGMENT + half..][..lanes::<S>() * S::U32_LANES];
                         let mut values = [0u32; SEGMENT];
-                        S::as_mut_simd_u32s(&mut values[..S::U32_LANES]).0[0] = totals[p][lane];
-                        for k in 0..S::U32_LANES {
-                            out[p * STRIP + x + k] = values[k] as i32 as f32 * scale;
+                        for (lane, total) in totals.iter().take(lanes::<S>()).enumerate() {
+                            S::as_mut_simd_u32s(&mut values[lane * S::U32_LANES..][..S::U32_LANES]).0[0] = *total;
+                        }
+                        for (out, value) in out.iter_mut().zip(values) {
+                            let value = value as i32 as f32 * (weight * unit);
+                            *out = if disc == 0 { value } else { *out + value };
                         }
                     }
                 }
@@ -191,6 +178,32 @@ impl Strip<'_> {
             out[3 * STRIP..].fill(1.0);
         }
     }
+}
+
+/// Sums the runs around row `y` for some columns, from column `at` of the cumulative sums on.
+#[inline(always)]
+fn sum_runs<S: Simd, const P: usize, const C: usize>(
+    simd: S,
+    runs: &[ColumnRun],
+    (y, rows): (usize, usize),
+    at: usize,
+    sums: &[[u32; C]],
+) -> [[S::u32s; 2]; P] {
+    let mut totals = [[simd.splat_u32s(0); 2]; P];
+    for run in runs {
+        let at = at.wrapping_add_signed(isize::from(run.offset));
+        let top = (y as isize + isize::from(run.half_height)) as usize & (rows - 1);
+        let bottom = (y as isize - isize::from(run.half_height) - 1) as usize & (rows - 1);
+        let (top, bottom) = (&sums[top * P..][..P], &sums[bottom * P..][..P]);
+        for p in 0..P {
+            let (top, bottom) = (&top[p][at..], &bottom[p][at..]);
+            for lane in 0..lanes::<S>() {
+                let (top, bottom) = (load::<S>(top, lane * S::U32_LANES), load::<S>(bottom, lane * S::U32_LANES));
+                totals[p][lane] = simd.sub_u32s(simd.add_u32s(totals[p][lane], top), bottom);
+            }
+        }
+    }
+    totals
 }
 
 /// Vectors of a segment that are summed at once: there are registers for two of every plane.
