@@ -1,7 +1,6 @@
 //! Pictures and depth maps: the data passed between the stages.
 
 #[doc(hidden)]
-pub mod change;
 pub mod crop;
 pub mod fit;
 mod matte;

@@ -52,8 +52,8 @@ pub const UNBOUNDED_COLOR: f32 = 1e20;
 /// finds content.
 pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
-/// The bins stay the same from frame to frame if content of at least this radius, in pixels, still fits them.
-const MIN_KEPT_RADIUS_PX: f32 = 5.0;
+/// Smallest radius of bins that are steadied, in pixels.
+const MIN_STEADY_RADIUS_PX: f32 = 5.0;
 /// Largest ratio of the radii of a bin whose discs are summed.
 const MAX_DISC_RATIO: f32 = 1.12;
 /// Up to this fraction of the picture may be blurred by more than [`SHARP_PX`](super::split::SHARP_PX) in a bin in focus
@@ -110,10 +110,8 @@ pub struct Plan {
     pub expansion: f32,
     /// True if the rank is full and the method is the paper's: an exact 2-D gather.
     pub exact: bool,
-    /// Whether results are kept from frame to frame ([`Settings::reuse`]); bins then stay the same while they fit.
+    /// Whether what is behind is steadied ([`Settings::reuse`]).
     pub reuse: bool,
-    /// Changes whenever the bins behind the focal plane do.
-    pub generation: u64,
     /// Set if this is the plan of a band of a larger picture ([`Plan::for_band`]).
     band: Option<BandRows>,
     coc: CocKind,
@@ -128,8 +126,6 @@ pub struct Plan {
     histogram: CocHistogram,
     /// Pieces behind and in front of the focal plane, each outwards.
     ranges: [Vec<CocRange>; 2],
-    /// The best pieces of the current frame.
-    new_ranges: [Vec<CocRange>; 2],
 }
 
 impl Plan {
@@ -156,7 +152,6 @@ impl Plan {
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
             reuse: settings.reuse,
-            generation: 0,
             ladder,
             band: None,
             coc: settings.coc,
@@ -166,7 +161,6 @@ impl Plan {
             max_px: [settings.far_max_px, settings.near_max_px],
             histogram: CocHistogram::default(),
             ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
-            new_ranges: std::array::from_fn(|_| Vec::with_capacity(MAX_RANGES)),
         };
         plan.reset_bins();
         plan
@@ -187,7 +181,6 @@ impl Plan {
     /// Resets the bins to those known without a frame: of a uniform radius or a ramp. With depth there is one bin until
     /// [`Plan::split_by_depth`] has seen a frame.
     fn reset_bins(&mut self) {
-        self.generation += 1;
         let [far_px, near_px] = self.max_px;
         let [far, near] = &mut self.ranges;
         far.clear();
@@ -233,15 +226,8 @@ impl Plan {
     fn plan_layers(&mut self) {
         let near_from_px = self.near_from_px();
         let sides = [false, true].map(|near| {
-            self.histogram.split_side(near, &self.level, near_from_px, &mut self.new_ranges[usize::from(near)])
+            self.histogram.split_side(near, &self.level, near_from_px, &mut self.ranges[usize::from(near)])
         });
-        let [far, near] = &mut self.ranges;
-        let [new_far, new_near] = &mut self.new_ranges;
-        std::mem::swap(near, new_near);
-        if far != new_far && !(self.reuse && self.histogram.refit(false, far, new_far, MIN_KEPT_RADIUS_PX)) {
-            std::mem::swap(far, new_far);
-            self.generation += 1;
-        }
         self.focus_px = sides[0].max(sides[1]).min(self.max_px[0].max(self.max_px[1]));
         self.create_bins();
         let focus = self.bins.iter().find(|bin| bin.slot == 0);
@@ -310,7 +296,7 @@ impl Plan {
     /// Whether a bin's content is steadied in time: detail that a smaller blur lets through would lag behind, and near
     /// objects move most.
     pub fn is_steadied(&self, bin: &Bin) -> bool {
-        self.reuse && !bin.near && bin.scale > 1 && bin.min_radius_px >= MIN_KEPT_RADIUS_PX
+        self.reuse && !bin.near && bin.scale > 1 && bin.min_radius_px >= MIN_STEADY_RADIUS_PX
     }
 
     /// Returns the rows of a band of the pass `bin`: whole rows of cells of every bin.

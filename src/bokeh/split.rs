@@ -24,12 +24,6 @@ const STRAY_FRACTION: f32 = 0.02;
 /// Half the width of the cross-fade between two bins, as a fraction of the border's CoC.
 pub const CROSS_FADE: f32 = 0.15;
 
-/// Kept ranges serve content up to this factor beyond their largest radius, and from this factor of their smallest on.
-const HIGH_TOLERANCE: f32 = 1.1;
-const LOW_TOLERANCE: f32 = 0.8;
-/// Fraction of the picture that may be below the latter.
-const MISFIT_FRACTION: f32 = 0.0005;
-
 /// Filters of a smaller radius have one tap, in pixels.
 pub const SHARP_PX: f32 = 0.4;
 
@@ -152,49 +146,6 @@ impl CocHistogram {
             sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
         }
         sums
-    }
-
-    /// Fits the ranges of an earlier frame, outwards, to this one, without changing their borders, nor the radii of
-    /// those from `kept_from_px` on. Returns false if they do not serve: they cost clearly more than the `best` of this
-    /// frame, or some content is outside the radii for which their filters and scales are made.
-    pub fn refit(&self, near: bool, ranges: &mut [CocRange], best: &[CocRange], kept_from_px: f32) -> bool {
-        if ranges.is_empty() || best.is_empty() {
-            return ranges.len() == best.len();
-        }
-        let (side, sums) = (&self.sides[usize::from(near)], self.sum_buckets(near));
-        let cost = |ranges: &[CocRange]| {
-            let borders = ranges.iter().map(|range| bucket_of(range.border_px));
-            let ends = borders.clone().skip(1).chain([BUCKETS]);
-            borders.zip(ends).map(|(from, to)| variance_between(&sums, from, to) + BIN_COST).sum::<f64>()
-        };
-        if cost(ranges) > cost(best) + BIN_COST {
-            return false;
-        }
-        for k in 0..ranges.len() {
-            let to = ranges.get(k + 1).map_or(BUCKETS, |next| bucket_of(next.border_px));
-            let range = &mut ranges[k];
-            let from = bucket_of(range.border_px).min(to);
-            if from == to {
-                continue;
-            }
-            let content = self.range_of_buckets(side, from, to);
-            let is_kept = range.low_px >= kept_from_px;
-            if is_kept != (content.low_px >= kept_from_px) {
-                return false;
-            }
-            if !is_kept {
-                (range.low_px, range.high_px) = (content.low_px, content.high_px);
-                continue;
-            }
-            // From where the range begins to fade in.
-            let from = bucket_of(range.border_px * (1.0 - CROSS_FADE));
-            let below = &side[from..bucket_of(range.low_px * LOW_TOLERANCE).clamp(from, to)];
-            let below = below.iter().sum::<u32>() as f32;
-            if below > MISFIT_FRACTION * self.samples as f32 || content.high_px > range.high_px * HIGH_TOLERANCE {
-                return false;
-            }
-        }
-        true
     }
 
     /// Returns the range of buckets `from..to`, with its border in the empty buckets before it.

@@ -173,9 +173,9 @@ impl ThreadPool {
         // returns and only once no worker is at work; no worker can enter after the gate is closed.
         let work: Work<'static> = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         shared.next.store(0, Ordering::Relaxed);
+        let pass = Pass { work, parts, caller: thread::current() };
         // SAFETY: the gate is closed and no worker is at work (see the wait below), so no other thread touches the
         // cell.
-        let pass = Pass { work, parts, caller: thread::current() };
         unsafe { *shared.work.get() = Some(pass.clone()) };
         let own = current_cpu();
         shared.placements.iter().take(parts - 1).for_each(|placement| placement.keep_off(own));
