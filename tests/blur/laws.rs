@@ -9,6 +9,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::color::{linear_to_srgb, srgb_to_linear};
+use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
@@ -265,6 +266,32 @@ fn a_frame_leaves_no_trace_in_the_next() {
         let map = depth(width, height, |x, y| [0.5, 1.0, 4.0, 1.4][((x / 30 + y / 20 + k) % 4) as usize]);
         cpu.blur(&image, Some(&map), &field, &mut out).expect("a blur");
         assert_eq!(out, blur(&settings(CocKind::Depth), &image, &map, &field), "frame {k}");
+    }
+}
+
+#[test]
+fn a_surface_that_moves_away_leaves_no_trace() {
+    let (width, height) = (96, 64);
+    let frame = |k: u32| {
+        let image = color(width, height, |x, y| [if (x / 2 + y / 2) % 2 == 0 { 60 + 30 * k as u8 } else { 20 }; 3]);
+        (image, depth(width, height, |x, _| if x < width / 2 { 1.0 } else { 2.0 + k as f32 }))
+    };
+    for far_max_px in [1.0, 1.4, 1.5, 2.0, 2.5, 3.0, 5.0, 8.0, 12.0, 16.0, 24.0] {
+        for quality in Quality::ALL {
+            let settings = Settings { quality, far_max_px, near_max_px: 20.0, ..settings(CocKind::Depth) };
+            let lens = DepthCoc { coc_at_infinity_px: far_max_px, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
+            let field = CocField::Depth(lens);
+            let mut executor = CpuBokeh::new(Plan::new(&settings, width, height), Some(2));
+            for k in [0, 1, 2, 3, 4, 1, 0, 3] {
+                let (image, mut map) = frame(k);
+                Matting::default().find_mixed_pixels(&mut map, &image, lens.inverse_depth_step(matting::MIN_STEP_PX));
+                let [mut after, mut alone] = [ColorImage::default(), ColorImage::default()];
+                executor.blur(&image, Some(&map), &field, &mut after).expect("a blur");
+                let mut fresh = CpuBokeh::new(Plan::new(&settings, width, height), Some(1));
+                fresh.blur(&image, Some(&map), &field, &mut alone).expect("a blur");
+                assert!(after == alone, "{far_max_px} px, {quality}, frame {k}: {}", codes_apart(&after, &alone));
+            }
+        }
     }
 }
 

@@ -96,6 +96,16 @@ fn a_still_scene_is_the_same_steadied_or_not() {
     }
 }
 
+/// Nothing was there before the first frame, and that is no content to start from.
+#[test]
+fn the_first_frame_is_the_same_to_the_bit() {
+    for light in [-60.0, 0.0, 90.0] {
+        let (picture, map) = scene(150, light, none);
+        let [steady, fresh] = Both::new().blur(&picture, &map);
+        assert_eq!(codes_apart(&steady, &fresh), 0, "{light}");
+    }
+}
+
 #[test]
 fn what_changes_shows_at_once() {
     let mut both = Both::new();

@@ -12,7 +12,7 @@ use crate::compute::simd::{abs, fma, load, store};
 const NEW_WEIGHT: f32 = 1.0 / 24.0;
 /// Difference of an sRGB code from which a pixel is replaced, and below half of which it is noise.
 const CHANGED_CODES: f32 = 5.0;
-/// Difference of the coverage from which a pixel is replaced.
+/// Difference of the coverage, as a fraction of the larger one, from which a pixel is replaced.
 const CHANGED_COVERAGE: f32 = 0.05;
 /// Linear light of a code's step at white, and what is added to the square root of light, so that the step at darker
 /// light is about their product.
@@ -29,19 +29,18 @@ pub fn steady<S: Simd, const W: usize>(
     x: usize,
 ) {
     let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-    let mut change = zero;
-    for p in 0..4 {
-        let (old, new) = (load::<S>(last, p * stride + at), load::<S>(&new[p], x));
-        let apart = abs(simd, simd.sub_f32s(new, old));
-        let relative = if p < 3 {
-            let root = simd.sqrt_f32s(simd.max_f32s(simd.max_f32s(old, new), zero));
-            let limit = simd
-                .mul_f32s(simd.add_f32s(root, simd.splat_f32s(DARK_ROOT)), simd.splat_f32s(CODE_STEP * CHANGED_CODES));
-            simd.div_f32s(apart, limit)
-        } else {
-            simd.mul_f32s(apart, simd.splat_f32s(1.0 / CHANGED_COVERAGE))
-        };
-        change = simd.max_f32s(change, relative);
+    // Premultiplied light counts by the coverage that it has, so that nothing is left of what was empty before.
+    let (old, value) = (load::<S>(last, 3 * stride + at), load::<S>(&new[3], x));
+    let coverage = simd.max_f32s(simd.max_f32s(old, value), simd.splat_f32s(1e-6));
+    let apart = abs(simd, simd.sub_f32s(value, old));
+    let mut change = simd.div_f32s(apart, simd.mul_f32s(coverage, simd.splat_f32s(CHANGED_COVERAGE)));
+    for p in 0..3 {
+        let (old, value) = (load::<S>(last, p * stride + at), load::<S>(&new[p], x));
+        let light = simd.max_f32s(simd.max_f32s(old, value), zero);
+        let root = simd.sqrt_f32s(simd.mul_f32s(light, coverage));
+        let dark = simd.mul_f32s(coverage, simd.splat_f32s(DARK_ROOT));
+        let limit = simd.mul_f32s(simd.add_f32s(root, dark), simd.splat_f32s(CODE_STEP * CHANGED_CODES));
+        change = simd.max_f32s(change, simd.div_f32s(abs(simd, simd.sub_f32s(value, old)), limit));
     }
     // From noise to change, the weight rises linearly.
     let weight = fma(simd, change, simd.splat_f32s(2.0), simd.splat_f32s(-1.0));

@@ -102,13 +102,19 @@ impl Random {
         }
     }
 
+    /// Often 0: plain discs are summed, all other apertures filtered.
+    fn intensity(&mut self) -> f32 {
+        let intensity = 2.0 * self.share() - 1.0;
+        if intensity.abs() < 0.5 { 0.0 } else { intensity }
+    }
+
     pub fn settings(&mut self, coc: CocKind) -> Settings {
         let near_max_px = if coc == CocKind::Depth { self.radius_px() } else { 0.0 };
         let far_max_px = if coc == CocKind::Depth && self.below(2) == 0 { near_max_px } else { self.radius_px() };
         Settings {
             coc,
             method: if self.below(6) == 0 { Method::Gather } else { Method::Layered },
-            aperture: Aperture { shape: self.shape(false), intensity: 2.0 * self.share() - 1.0 },
+            aperture: Aperture { shape: self.shape(false), intensity: self.intensity() },
             rim: self.share(),
             rank: match self.below(4) {
                 0 => Some(Rank::Terms(1 + self.below(16) as u32)),

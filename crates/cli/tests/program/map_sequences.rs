@@ -141,7 +141,8 @@ fn each_frame_of_a_video_has_its_map() {
     Ran::of(ffmpeg.args(["-c:v", "libx264rgb", "-qp", "0"]).arg(home.path("clip.mp4"))).done();
     let maps = || (0..FRAMES).map(|frame| home.path(format!("maps/frame_{:04}.png", frame + 1)));
     maps().enumerate().for_each(|(frame, path)| write_map(&path, frame));
-    let given = ["--depth", "maps", "--depth-unit", "millimetres"];
+    // The focus follows with some inertia: a radius that shows, and not one that is nearly sharp.
+    let given = ["--depth", "maps", "--depth-unit", "millimetres", "--coc-at-infinity", "12"];
     stream(&home, &[&["shots", "--to", "pictures/"], &given[..]].concat()).done();
     stream(&home, &[&["clip.mp4", "--to", "video/"], &given[..]].concat()).done();
     assert!(frames(&home, "pictures") == frames(&home, "video"));
