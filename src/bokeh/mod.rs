@@ -97,7 +97,7 @@ pub struct Settings {
     pub aperture: aperture::Aperture,
     /// Width of the soft rim, as a fraction of the radius, 0 to 1.
     pub rim: f32,
-    /// Number of separable terms; `None` uses that of the quality level.
+    /// Number of separable terms; `None` uses that of the quality level, or sums discs of an even radius instead.
     pub rank: Option<Rank>,
     /// Highlight recovery `M`: clipped white counts as `M` times as bright; 0 switches it off.
     pub highlights: f32,
