@@ -13,6 +13,7 @@
 //!    8-bit sRGB.
 
 mod band;
+mod filters;
 mod slots;
 
 use std::sync::Arc;
@@ -21,7 +22,6 @@ use band::BandRows;
 
 use super::bank::FilterBank;
 pub use super::bin_weight::BinWeight;
-use super::disc::{self, DiscBank};
 use super::ladder::{Compositing, QualityLadder};
 use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, compensated_radius_px, scale_within};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
@@ -52,10 +52,6 @@ pub const UNBOUNDED_COLOR: f32 = 1e20;
 /// finds content.
 pub const MIN_CELL_WEIGHT: f32 = 0.02;
 
-/// Smallest radius of bins that are steadied, in pixels.
-const MIN_STEADY_RADIUS_PX: f32 = 5.0;
-/// Largest ratio of the radii of a bin whose discs are summed.
-const MAX_DISC_RATIO: f32 = 1.12;
 /// Up to this fraction of the picture may be blurred by more than [`SHARP_PX`](super::split::SHARP_PX) in a bin in focus
 /// that is shown as it is.
 const MAX_DEFOCUSED_FRACTION: f32 = 0.0005;
@@ -278,55 +274,16 @@ impl Plan {
         }
     }
 
-    /// Returns the aperture as discs, if a bin may be summed instead of filtered: if its radii are large enough, and hardly
-    /// differ, as discs of whole pixels change in steps.
-    pub fn discs(&self, bin: &Bin) -> Option<&DiscBank> {
-        let min_px = compensated_radius_px(bin.min_radius_px, bin.scale);
-        let is_even = min_px * MAX_DISC_RATIO >= bin.max_radius_px;
-        let is_round = min_px >= disc::MIN_RADIUS_PX && self.compositing != Compositing::Gather;
-        self.ladder.discs.as_ref().filter(|_| is_even && is_round)
-    }
-
     /// Returns the index of the bin in focus, if none of its content is blurred visibly, nor hidden by something in
     /// front: it is shown as it is.
     pub fn sharp_bin(&self) -> Option<usize> {
         self.bins.first().filter(|bin| bin.slot == 0 && self.is_focus_sharp).map(|_| 0)
     }
 
-    /// Whether a bin's content is steadied in time: detail that a smaller blur lets through would lag behind, and near
-    /// objects move most.
-    pub fn is_steadied(&self, bin: &Bin) -> bool {
-        self.reuse && !bin.near && bin.scale > 1 && bin.min_radius_px >= MIN_STEADY_RADIUS_PX
-    }
-
     /// Returns the rows of a band of the pass `bin`: whole rows of cells of every bin.
     pub fn band_rows(&self) -> usize {
         let coarsest = self.bins.iter().map(|bin| bin.scale).max().unwrap_or(1);
         CELL * coarsest.max(SCALES[2])
-    }
-
-    /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: a
-    /// symmetric kernel has `half_width + 1`, any other `2 half_width + 1`.
-    pub fn has_overshoot(&self, bin: &Bin) -> bool {
-        let half_width = self.bin_half_width(bin);
-        self.bank.terms < if self.bank.is_symmetric { half_width } else { 2 * half_width }
-    }
-
-    /// Returns the outermost tap of a bin's filters, in bin pixels.
-    pub fn bin_half_width(&self, bin: &Bin) -> usize {
-        self.bank.node_half_width[self.bank.nearest_node(bin.max_radius_px)] as usize
-    }
-
-    /// Returns the radius of the neighbourhood of a cell, in cells: the filter support and one segment, for which a
-    /// radius is read.
-    pub fn radius_cells(&self, bin: &Bin) -> usize {
-        (self.bin_half_width(bin) + SEGMENT).div_ceil(CELL)
-    }
-
-    /// Returns the radius in bin pixels for a CoC radius in pixels of the picture.
-    #[inline(always)]
-    pub fn bin_radius_px(&self, bin: &Bin, coc_px: f32) -> f32 {
-        compensated_radius_px(coc_px, bin.scale).min(bin.max_radius_px)
     }
 
     /// Returns the weight function of bin `index`.
