@@ -64,6 +64,16 @@ fn given_radii_are_those_of_a_rule_over_depth() {
     }
 }
 
+#[test]
+fn one_radius_given_for_each_pixel_is_that_radius() {
+    let (image, radii) = (noise(SIZE.0, SIZE.1), vec![12.0; (SIZE.0 * SIZE.1) as usize]);
+    let mut slices = SliceBlur::new(&settings(CocKind::Uniform), SIZE, Some(2)).unwrap();
+    let field = coc(CocKind::Uniform, SIZE.1);
+    let by_rule = blurred(&mut slices, &image.rgb, Radii::Field(&field, None));
+    assert_eq!(blurred(&mut slices, &image.rgb, Radii::Each(&radii)), by_rule);
+    assert_ne!(by_rule, image.rgb);
+}
+
 /// Both differ by the sRGB curve, whose polynomial for codes is off by 0.004 of a code, and by what is interpolated between
 /// pixels of a bin: codes or light.
 #[test]

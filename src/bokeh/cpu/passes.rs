@@ -8,7 +8,7 @@ use super::bin_parts::{BinParts, StripParts};
 use super::blur::Strip;
 use super::composite::Composite;
 use super::marking::MarkSilhouettes;
-use super::pixels::{Radii, Sample};
+use super::pixels::Sample;
 use super::reach::DilateRadii;
 use super::tiles::{BLOCK, ComputeTileRanges, TILE_H};
 use super::unpack::InputFrame;
@@ -50,8 +50,8 @@ impl CpuBokeh {
                 arch.dispatch(MarkSilhouettes { source: frame, ranges, rows, marks, near_from_px });
             });
             self.silhouettes.dilate(&mut self.workers, arch);
-        } else if let Radii::Field(field, _) = frame.coc {
-            self.tiles.set_ranges(field);
+        } else {
+            self.tiles.set_ranges(frame.coc);
         }
         self.tiles.classify(layered);
         self.tiles.find_only_bins(&self.plan, frame.matte);

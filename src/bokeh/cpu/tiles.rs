@@ -75,10 +75,10 @@ impl Tiles {
         erode(&self.still, &mut self.scratch, &mut self.idle, size);
     }
 
-    /// Sets the range of all tiles, if it is known without depth.
-    pub fn set_ranges(&mut self, field: &CocField) {
-        let range = match field {
-            CocField::Uniform { radius_px } => (*radius_px, *radius_px),
+    /// Sets the range of all tiles, where no layer needs those of each: one radius, or any.
+    pub fn set_ranges(&mut self, coc: Radii<'_>) {
+        let range = match coc {
+            Radii::Field(CocField::Uniform { radius_px }, _) => (*radius_px, *radius_px),
             _ => (f32::NEG_INFINITY, f32::INFINITY),
         };
         self.ranges.fill(range);
