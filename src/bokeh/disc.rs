@@ -40,9 +40,13 @@ pub struct DiscBank {
 
 impl DiscBank {
     /// Creates the kernels of a disc whose rim falls linearly over `rim` (0 to 1) of its radius, half inside and half
-    /// outside, for radii up to `max_radius_px`.
-    pub fn new(rim: f32, max_radius_px: f32) -> Self {
+    /// outside, for radii up to `max_radius_px`; `None` if they are wider than [`MAX_HALF_WIDTH`].
+    pub fn new(rim: f32, max_radius_px: f32) -> Option<Self> {
         let (rim, max_px) = (f64::from(rim.clamp(0.0, 1.0)), f64::from(max_radius_px.max(MIN_RADIUS_PX)));
+        // Checked first: the kernels of hundreds of pixels would take seconds and gigabytes.
+        if max_px * (1.0 + rim / 2.0) > MAX_HALF_WIDTH as f64 {
+            return None;
+        }
         let lattice = LatticeDiscs::new((max_px * (1.0 + rim / 2.0)).ceil() as i32 + 2);
         let mut bank = Self { runs: Vec::new(), discs: Vec::new(), nodes: Vec::new() };
         for node in 0..=(max_px * f64::from(STEPS_PER_PX)).ceil() as usize {
@@ -68,7 +72,7 @@ impl DiscBank {
             bank.discs[first..].iter_mut().for_each(|(_, weight)| *weight = (f64::from(*weight) / total) as f32);
             bank.nodes.push((bank.discs.len(), (smoothing / 2.0) as f32));
         }
-        bank
+        (bank.max_half_width() <= MAX_HALF_WIDTH).then_some(bank)
     }
 
     #[inline(always)]
@@ -181,7 +185,7 @@ mod tests {
     #[test]
     fn a_kernel_is_round_and_blurs_as_much_as_its_disc() {
         for rim in [0.0, 0.2, 0.6, 1.0] {
-            let bank = DiscBank::new(rim, 28.0);
+            let bank = DiscBank::new(rim, 28.0).unwrap();
             for step in 0..=300 {
                 let radius_px = MIN_RADIUS_PX + step as f32 / 16.0;
                 let [mut total, mut across, mut down] = [0.0; 3];

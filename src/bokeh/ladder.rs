@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::aperture::Shape;
 use super::bank::FilterBank;
-use super::disc::{DiscBank, MAX_HALF_WIDTH};
+use super::disc::DiscBank;
 use super::quality_level::{MAX_FULL_RADIUS_PX, QUALITY_LEVELS, QualityLevel, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
@@ -76,8 +76,8 @@ impl QualityLadder {
         });
         let levels = levels.collect();
         let is_disc = settings.aperture.shape == Shape::Disc && settings.aperture.intensity == 0.0;
-        let discs = (is_disc && settings.rank.is_none()).then(|| DiscBank::new(settings.rim, disc_px));
-        let discs = discs.filter(|discs| discs.max_half_width() <= MAX_HALF_WIDTH);
+        let is_summed = is_disc && settings.rank.is_none() && compositing != Compositing::Gather;
+        let discs = is_summed.then(|| DiscBank::new(settings.rim, disc_px)).flatten();
         Self { levels, banks, discs }
     }
 

@@ -20,6 +20,14 @@ pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
     if S::IS_SCALAR { simd.add_f32s(simd.mul_f32s(a, b), c) } else { simd.mul_add_f32s(a, b, c) }
 }
 
+/// Returns a number from 0 to 2^22, rounded. At 2^23 a float has no fraction, and its lowest bits are the integer: vectors
+/// do this in one addition.
+#[inline(always)]
+pub fn round_to_integer(value: f32) -> u32 {
+    const TO_INTEGER: f32 = (1 << 23) as f32;
+    (value + TO_INTEGER).to_bits().wrapping_sub(TO_INTEGER.to_bits())
+}
+
 /// Loads one vector of `values`, from index `at` on.
 #[inline(always)]
 pub fn load<S: Simd>(values: &[f32], at: usize) -> S::f32s {

@@ -11,11 +11,11 @@ use super::blur::Strip;
 use super::rows::{COPY_WIDTH, STRIP, STRIP_ROW};
 use crate::bokeh::disc::{ColumnRun, DiscBank, MAX_HALF_WIDTH};
 use crate::bokeh::plan::{CELL, SEGMENT};
-use crate::compute::simd::madd;
+use crate::compute::simd::{madd, round_to_integer};
 
 /// Lines of the source in memory at once: a row and its neighbours.
 const LINES: usize = 4;
-/// Largest number of steps of a value. Added to 2^23, a float's lowest bits are then the rounded integer.
+/// Largest number of steps of a value: what [`round_to_integer`] can round.
 const MAX_STEPS: f32 = (1 << 22) as f32;
 
 /// Scratch memory for the discs of a thread.
@@ -121,7 +121,6 @@ impl Strip<'_> {
         running: &mut [[u32; C]; P],
         sums: &mut [[u32; C]],
     ) {
-        const TO_INTEGER: f32 = (1 << 23) as f32;
         let line = |y: isize, p: usize| -> &[f32; C] { &lines[(y as usize % LINES) * 4 * C..].as_chunks::<C>().0[p] };
         let middle = 1.0 - 2.0 * smoothing;
         let here = &mut sums[(y as usize & (rows - 1)) * P..][..P];
@@ -134,8 +133,7 @@ impl Strip<'_> {
             let (running, out) = (&mut running[p], &mut here[p]);
             for x in 1..C - 1 {
                 let value = madd::<S>(smoothed[x - 1] + smoothed[x + 1], smoothing, smoothed[x] * middle);
-                let value = (value + TO_INTEGER).to_bits().wrapping_sub(TO_INTEGER.to_bits());
-                running[x] = running[x].wrapping_add(value);
+                running[x] = running[x].wrapping_add(round_to_integer(value));
                 out[x] = running[x];
             }
         }

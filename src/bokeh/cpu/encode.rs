@@ -7,7 +7,7 @@
 use pulp::Simd;
 
 use crate::color::{ToneCurves, encode_srgb};
-use crate::compute::simd::madd;
+use crate::compute::simd::{madd, round_to_integer};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
@@ -57,8 +57,7 @@ impl EncodeTable {
                 let light = if light < 1.0 { light } else { 1.0 };
                 let steps = ENCODE_STEPS as f32;
                 let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
-                // At 2^23 a float has no fraction, and its lowest bits are the integer.
-                *index = (light * scale + first + 8_388_608.0).to_bits();
+                *index = round_to_integer(light * scale + first);
             }
         }
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {

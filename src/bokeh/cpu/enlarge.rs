@@ -14,7 +14,7 @@ use super::unpack::compression_factor;
 use crate::bokeh::plan::{Bin, MIN_COVERAGE};
 use crate::color::luminance;
 use crate::compute::aligned::CacheAligned;
-use crate::compute::simd::madd;
+use crate::compute::simd::{madd, round_to_integer};
 
 /// Bin pixels across a chunk at the finest reduced scale, and one more on both sides.
 const ACROSS: usize = CHUNK / 2 + 16;
@@ -134,8 +134,6 @@ impl Enlarge<'_> {
 /// Enlarges a row of codes `N` times and rounds it.
 #[inline(always)]
 fn enlarge_columns<S: Simd, const N: usize>(codes: &[f32; ACROSS], out: &mut [u8; CHUNK]) {
-    // At 2^23 a float has no fraction, and its lowest bits are the integer.
-    const TO_INTEGER: f32 = (1 << 23) as f32;
     let groups = out.as_chunks_mut::<N>().0;
     for k in 0..CHUNK / N {
         let (before, here, after) = (codes[BEFORE + k - 1], codes[BEFORE + k], codes[BEFORE + k + 1]);
@@ -146,7 +144,7 @@ fn enlarge_columns<S: Simd, const N: usize>(codes: &[f32; ACROSS], out: &mut [u8
             } else {
                 madd::<S>(after - here, offset, here)
             };
-            groups[k][i] = (code + TO_INTEGER).to_bits() as u8;
+            groups[k][i] = round_to_integer(code) as u8;
         }
     }
 }

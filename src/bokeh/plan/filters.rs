@@ -1,6 +1,6 @@
 //! How the content of a bin is filtered: by which kernels, how far they reach, and whether it is steadied in time.
 
-use super::{Bin, CELL, Compositing, Plan, SEGMENT, compensated_radius_px};
+use super::{Bin, CELL, Plan, SEGMENT, compensated_radius_px};
 use crate::bokeh::disc::{self, DiscBank};
 
 /// Smallest radius of bins that are steadied, in pixels.
@@ -13,7 +13,7 @@ impl Plan {
     pub fn discs(&self, bin: &Bin) -> Option<&DiscBank> {
         let min_px = compensated_radius_px(bin.min_radius_px, bin.scale);
         let is_even = min_px * MAX_DISC_RATIO >= bin.max_radius_px;
-        let is_round = min_px >= disc::MIN_RADIUS_PX && self.compositing != Compositing::Gather;
+        let is_round = min_px >= disc::MIN_RADIUS_PX;
         self.ladder.discs.as_ref().filter(|_| is_even && is_round)
     }
 
