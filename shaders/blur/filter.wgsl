@@ -30,7 +30,7 @@ fn interpolate_edge(corner: Corner, index: u32) -> vec4<f32> {
     return mix(edges[corner.above + index], edges[corner.below + index], corner.down);
 }
 
-// Outermost tap of a node.
+// Outermost tap of a node at full scale.
 fn half_width_of_node(node: u32) -> i32 {
     let first = u32(OCTAVES_FROM_PX * frame.steps_per_px);
     var radius_px = f32(node) / frame.steps_per_px;
@@ -51,10 +51,14 @@ fn find_taps(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     }
     let left = nearest_node(radii.x, frame.steps_per_px, frame.nodes);
     let right = nearest_node(radii.y, frame.steps_per_px, frame.nodes);
-    let origin = (vec2(left, right) * (2u * frame.half_width + 1u) + frame.half_width) * frame.groups + work.group;
+    // The filters for reduced scales come after those for full scale.
+    let is_reduced = u32(bins[k].scale > 1u);
+    let nodes = vec2(left, right) + is_reduced * frame.nodes;
+    let origin = (nodes * (2u * frame.half_width + 1u) + frame.half_width) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);
     // Clamped to the bin's outermost tap, however the device rounds.
-    return Taps(i32(origin.x), i32(origin.y), step, min(half_width_of_node(max(left, right)), i32(bins[k].half_width)));
+    return Taps(i32(origin.x), i32(origin.y), step,
+                min(half_width_of_node(max(left, right)) + i32(is_reduced * EXTRA_TAPS), i32(bins[k].half_width)));
 }
 
 // Tap `j` of four terms.

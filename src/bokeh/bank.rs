@@ -1,11 +1,17 @@
 //! The filter bank: separable 1-D kernels for every radius.
 //!
-//! The singular functions of an aperture scale with the radius, so a filter tap is the integral of one of them over a
-//! pixel: a difference of two values of its cumulative table. Fractional radii are therefore exact and continuous.
+//! The singular functions of an aperture scale with the radius, so a filter tap at full scale is the integral of one of
+//! them over a pixel: a difference of two values of its cumulative table. Fractional radii are therefore exact and
+//! continuous.
+
+mod reduced;
 
 use super::Rank;
 use super::aperture::Mask;
 use super::low_rank::Decomposition;
+pub use reduced::{EXTRA_TAPS, compensated_radius_px};
+
+use reduced::ReducedTaps;
 
 /// Nodes per pixel of radius, up to twice [`OCTAVES_FROM_PX`].
 pub const STEPS_PER_PX: f32 = 16.0;
@@ -22,9 +28,9 @@ pub const OCTAVE_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - NODES_PER_OCTAVE.ilog2(
 /// Side of the mask that a bank is made from, in cells.
 pub const MASK_CELLS: usize = 128;
 
-/// The separable filters of one aperture, for radii from 0 to a maximum.
+/// The separable filters of one aperture, for radii from 0 to a maximum: for full scale, and for reduced scales.
 ///
-/// The filter of node `k` has the radius [`node_radius_px`];
+/// The filter of node `k`, and of node `nodes + k` for reduced scales, has the radius [`node_radius_px`];
 /// `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i) in(p + (i, j))` (McGraw, *Fast Bokeh Effects Using
 /// Low-Rank Linear Filters*, eq. 2), and its taps sum to 1 at every node.
 #[derive(Clone, Debug)]
@@ -33,7 +39,7 @@ pub struct FilterBank {
     pub terms: usize,
     /// Half-width at the largest radius: taps go from `-half_width` to `half_width`.
     pub half_width: usize,
-    /// Number of tabulated radii.
+    /// Number of tabulated radii, of each kind.
     pub nodes: usize,
     /// True if every profile is symmetric, so that taps at `-j` and `j` are equal.
     pub is_symmetric: bool,
@@ -50,11 +56,18 @@ pub struct FilterBank {
 impl FilterBank {
     /// Creates the bank of a mask for radii up to `max_radius_px`.
     pub fn new(mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
-        Self::from_decomposition(&Decomposition::new(mask), mask, rank, max_radius_px)
+        Self::from_decomposition(&Decomposition::new(mask), mask, rank, max_radius_px, true)
     }
 
-    /// Same as [`FilterBank::new`], given the decomposition of `mask`.
-    pub fn from_decomposition(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
+    /// Same as [`FilterBank::new`], given the decomposition of `mask`; filters for reduced scales only if they are
+    /// `with_reduced`.
+    pub fn from_decomposition(
+        svd: &Decomposition,
+        mask: &Mask,
+        rank: Rank,
+        max_radius_px: f32,
+        with_reduced: bool,
+    ) -> Self {
         let terms = match rank {
             Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
             Rank::Full => svd.numerical_rank(),
@@ -78,33 +91,58 @@ impl FilterBank {
         }
 
         let nodes = count_nodes(max_radius_px.max(0.0));
-        let half_width_at = |node: usize| (f64::from(node_radius_px(node)) * mask.extent - 0.5).ceil().max(0.0);
-        let half_width = half_width_at(nodes - 1) as usize;
+        let half_width_at =
+            |node: usize| (f64::from(node_radius_px(node)) * mask.extent - 0.5).ceil().max(0.0) as usize;
+        let node_half_width: Vec<u32> = [0, EXTRA_TAPS][..1 + usize::from(with_reduced)]
+            .iter()
+            .flat_map(|extra| (0..nodes).map(move |node| (half_width_at(node) + extra) as u32))
+            .collect();
+        let half_width = *node_half_width.last().expect("radius 0 is a node") as usize;
         let symmetry = mask.symmetry();
+        let taps = node_half_width.len() * (2 * half_width + 1) * terms;
         let mut bank = Self {
             terms,
             half_width,
             nodes,
             is_symmetric: symmetry == (true, true),
             extent: mask.extent,
-            node_half_width: (0..nodes).map(|k| half_width_at(k) as u32).collect(),
-            horizontal: Vec::with_capacity(nodes * (2 * half_width + 1) * terms),
-            vertical: Vec::with_capacity(nodes * (2 * half_width + 1) * terms),
+            node_half_width,
+            horizontal: vec![0.0; taps],
+            vertical: vec![0.0; taps],
         };
-        for node in 0..nodes {
+        let reduced = ReducedTaps::new();
+        let mut lines = [vec![0.0; 2 * half_width + 1], vec![0.0; 2 * half_width + 1]];
+        for node in 0..bank.node_half_width.len() {
             // At radius 0, tap 0 covers the whole profile.
-            let radius_px = (f64::from(node_radius_px(node)) * mask.extent).max(1e-6);
-            for j in -(half_width as i64)..=half_width as i64 {
-                let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
-                for t in 0..terms {
-                    bank.horizontal.push(
-                        (interpolate_cumulative(&across[t], right) - interpolate_cumulative(&across[t], left)) as f32,
-                    );
-                    bank.vertical.push(
-                        (interpolate_cumulative(&down[t], right) - interpolate_cumulative(&down[t], left)) as f32,
-                    );
+            let radius_px = (f64::from(node_radius_px(node % nodes)) * mask.extent).max(1e-6);
+            let reach = bank.node_half_width[node] as usize;
+            let mut total = 0.0;
+            for t in 0..terms {
+                for (line, profile) in lines.iter_mut().zip([&across[t], &down[t]]) {
+                    let integral = |from: f64, to: f64| {
+                        interpolate_cumulative(profile, to / radius_px)
+                            - interpolate_cumulative(profile, from / radius_px)
+                    };
+                    let line = &mut line[..2 * reach + 1];
+                    if node < nodes {
+                        for (j, tap) in line.iter_mut().enumerate() {
+                            let x = j as f64 - reach as f64;
+                            *tap = integral(x - 0.5, x + 0.5);
+                        }
+                    } else {
+                        reduced.sample(integral, line);
+                    }
                 }
+                for j in 0..2 * reach + 1 {
+                    let at = bank.tap_index(node, j as isize - reach as isize) + t;
+                    (bank.horizontal[at], bank.vertical[at]) = (lines[0][j] as f32, lines[1][j] as f32);
+                }
+                let [across, down] = lines.each_ref().map(|line| line[..2 * reach + 1].iter().sum::<f64>());
+                total += across * down;
             }
+            // What is cut off beyond the last tap is spread over all.
+            let row = bank.tap_index(node, -(half_width as isize))..bank.tap_index(node + 1, -(half_width as isize));
+            bank.vertical[row].iter_mut().for_each(|tap| *tap = (f64::from(*tap) / total) as f32);
         }
         bank
     }
@@ -121,10 +159,16 @@ impl FilterBank {
         node_radius_px(self.nodes - 1)
     }
 
-    /// Returns the node nearest to a radius in pixels.
+    /// Returns the node nearest to a radius in pixels, at full scale.
     #[inline(always)]
     pub fn nearest_node(&self, radius_px: f32) -> usize {
         round_to_node(radius_px).min(self.nodes - 1)
+    }
+
+    /// Returns the first node of the filters for a scale.
+    #[inline(always)]
+    pub fn first_node(&self, scale: usize) -> usize {
+        if scale > 1 { self.nodes } else { 0 }
     }
 
     /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_half_width[node]`, row-major. With `turned`,
@@ -176,119 +220,4 @@ fn interpolate_cumulative(cumulative: &[f64], x: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::aperture::{Aperture, Shape};
-    use super::*;
-
-    fn bank(shape: Shape, rank: Rank) -> FilterBank {
-        FilterBank::new(&Aperture { shape, intensity: 0.0 }.to_mask(MASK_CELLS, 0.2), rank, 10.0)
-    }
-
-    #[test]
-    fn every_filter_sums_to_one_at_every_radius_and_rank() {
-        for shape in [Shape::Disc, Shape::Heart, Shape::Ring { inner: 0.6 }] {
-            for rank in [Rank::Terms(1), Rank::Terms(3), Rank::Full] {
-                let bank = bank(shape.clone(), rank);
-                for node in 0..bank.nodes {
-                    let sum: f32 = bank.kernel(node, false).iter().sum();
-                    assert!((sum - 1.0).abs() < 1e-4, "{shape:?} {rank:?} {node}: {sum}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_full_bank_is_the_area_sampled_aperture() {
-        let mask = Aperture::default().to_mask(MASK_CELLS, 0.2);
-        let bank = FilterBank::new(&mask, Rank::Full, 10.0);
-        for node in [5, 40, 101, 160] {
-            let radius_px = node as f64 / f64::from(STEPS_PER_PX) * mask.extent;
-            let half_width = bank.node_half_width[node] as i64;
-            let side = 2 * half_width + 1;
-            // Fraction of the mask's light that falls on each pixel, summed over the mask's cells.
-            let mut direct = vec![0.0; (side * side) as usize];
-            let (cell, sum) = (2.0 * radius_px / mask.size as f64, mask.sum());
-            let overlap = |index: usize| {
-                let (from, to) = (index as f64 * cell - radius_px, (index + 1) as f64 * cell - radius_px);
-                let border = to.round() + if to.round() > to { -0.5 } else { 0.5 };
-                let first = ((border - from) / cell).clamp(0.0, 1.0);
-                [(border - 0.5, first), (border + 0.5, 1.0 - first)]
-            };
-            for (k, value) in mask.values.iter().enumerate() {
-                for (y, fraction_y) in overlap(k / mask.size) {
-                    for (x, fraction_x) in overlap(k % mask.size) {
-                        let (x, y) = (x as i64 + half_width, y as i64 + half_width);
-                        if fraction_x * fraction_y > 0.0 {
-                            direct[(y * side + x) as usize] += value / sum * fraction_x * fraction_y;
-                        }
-                    }
-                }
-            }
-            let kernel = bank.kernel(node, true);
-            let peak = direct.iter().copied().fold(0.0, f64::max);
-            for (a, b) in kernel.iter().zip(&direct) {
-                assert!((f64::from(*a) - b).abs() < 1e-4 * peak, "node {node}: {a} against {b}");
-            }
-        }
-    }
-
-    #[test]
-    fn nodes_are_a_sixteenth_of_a_pixel_apart_and_then_a_share_of_the_radius() {
-        assert_eq!(node_radius_px(161), 10.0625);
-        let mut before_px = -1.0 / STEPS_PER_PX;
-        for node in 0..3000 {
-            let radius_px = node_radius_px(node);
-            let step_px = radius_px - before_px;
-            let max_px = (radius_px / OCTAVES_FROM_PX).max(1.0) / STEPS_PER_PX;
-            assert!(step_px > max_px / 2.01 && step_px <= max_px, "{radius_px}: {step_px}");
-            for aside_px in [-0.49 * step_px, 0.0, 0.24 * step_px] {
-                assert_eq!(round_to_node((radius_px + aside_px).max(0.0)), node, "{radius_px} {aside_px}");
-            }
-            assert_eq!(count_nodes(radius_px), node + 1);
-            assert_eq!(count_nodes(radius_px + 0.2 * step_px), node + 2);
-            before_px = radius_px;
-        }
-    }
-
-    /// The table's size grows linearly with the radius.
-    #[test]
-    fn a_table_of_a_wide_blur_is_no_more_than_in_proportion() {
-        let taps = |radius_px| {
-            let mask = Aperture::default().to_mask(MASK_CELLS, 0.2);
-            FilterBank::new(&mask, Rank::Terms(2), radius_px).horizontal.len() as f32
-        };
-        let (narrow, wide) = (taps(64.0), taps(1024.0));
-        assert!(wide < 16.0 * narrow * 2.5, "{narrow} to {wide}");
-    }
-
-    #[test]
-    fn no_shift_and_the_second_moment_grows_with_the_radius() {
-        let bank = bank(Shape::Disc, Rank::Terms(3));
-        for node in (32..bank.nodes).step_by(16) {
-            let (kernel, half_width) = (bank.kernel(node, false), bank.node_half_width[node] as i64);
-            let side = 2 * half_width + 1;
-            let moment = |power: i32| -> f64 {
-                kernel
-                    .iter()
-                    .enumerate()
-                    .map(|(k, w)| f64::from(*w) * ((k as i64 % side - half_width) as f64).powi(power))
-                    .sum()
-            };
-            let radius_px = node as f64 / f64::from(STEPS_PER_PX);
-            assert!(moment(1).abs() < 1e-4);
-            // A disc of radius R has variance R^2 / 4 per axis; pixels add 1 / 12, the rim and the rank a little.
-            assert!((moment(2) / (radius_px * radius_px / 4.0 + 1.0 / 12.0) - 1.0).abs() < 0.05, "{node}");
-        }
-    }
-
-    #[test]
-    fn far_content_shows_the_aperture_upright_and_near_content_turns_it() {
-        let bank = bank(Shape::Heart, Rank::Terms(8));
-        let node = 160;
-        let (half_width, side) = (bank.node_half_width[node] as usize, 2 * bank.node_half_width[node] as usize + 1);
-        let upper = |kernel: &[f32]| kernel[..half_width * side].iter().sum::<f32>();
-        // A kernel that gathers draws a point rotated by 180 degrees: for an upright heart its weight is below.
-        assert!(upper(&bank.kernel(node, false)) < 0.45);
-        assert!(upper(&bank.kernel(node, true)) > 0.55);
-    }
-}
+mod tests;

@@ -5,9 +5,7 @@ mod factors;
 
 use std::sync::Arc;
 
-use super::aperture::Shape;
 use super::bank::FilterBank;
-use super::disc::DiscBank;
 use super::quality_level::{MAX_FULL_RADIUS_PX, QUALITY_LEVELS, QualityLevel, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
@@ -40,8 +38,6 @@ pub struct QualityLadder {
     levels: Vec<LadderLevel>,
     /// Filter banks, in bin pixels; levels share equal banks.
     pub banks: Vec<Arc<FilterBank>>,
-    /// The aperture as discs, if it is one and its number of terms was not chosen; in bin pixels.
-    pub discs: Option<DiscBank>,
 }
 
 impl QualityLadder {
@@ -53,7 +49,6 @@ impl QualityLadder {
         let mut bank_keys: Vec<(Rank, f32)> = Vec::new();
         let mut banks = Vec::new();
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
-        let mut disc_px = 0.0_f32;
         let levels = Quality::ALL.into_iter().filter(wanted).map(|quality| {
             let level = QUALITY_LEVELS[quality as usize];
             let terms = if settings.coc == CocKind::Uniform { level.uniform_rank } else { level.rank };
@@ -63,22 +58,21 @@ impl QualityLadder {
                 // Gathering is at full scale.
                 _ if compositing == Compositing::Gather => max_px,
                 _ if settings.rank == Some(Rank::Full) => max_px.min((max_px / coarsest).max(MAX_FULL_RADIUS_PX)),
-                CocKind::Uniform => max_px / level.uniform_scale(max_px) as f32,
+                CocKind::Uniform => max_px / level.scale(max_px, max_px) as f32,
                 _ => max_px.min((max_px / coarsest).max(level.max_bin_radius_px)),
             };
             let bank = bank_keys.iter().position(|&key| key == (rank, bank_px)).unwrap_or_else(|| {
                 bank_keys.push((rank, bank_px));
-                banks.push(Arc::new(FilterBank::from_decomposition(&factors.svd, &factors.mask, rank, bank_px)));
+                // Gathers, and the bins of all terms up to a limit, are at full scale.
+                let with_reduced = compositing != Compositing::Gather && (rank != Rank::Full || bank_px < max_px);
+                let ApertureFactors { svd, mask } = &*factors;
+                banks.push(Arc::new(FilterBank::from_decomposition(svd, mask, rank, bank_px, with_reduced)));
                 banks.len() - 1
             });
-            disc_px = disc_px.max(bank_px);
             LadderLevel { quality, level, bank }
         });
         let levels = levels.collect();
-        let is_disc = settings.aperture.shape == Shape::Disc && settings.aperture.intensity == 0.0;
-        let is_summed = is_disc && settings.rank.is_none() && compositing != Compositing::Gather;
-        let discs = is_summed.then(|| DiscBank::new(settings.rim, disc_px)).flatten();
-        Self { levels, banks, discs }
+        Self { levels, banks }
     }
 
     /// Returns the level of a quality, or the nearest one.

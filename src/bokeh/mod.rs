@@ -10,8 +10,6 @@ pub mod bank;
 pub mod bin_weight;
 #[doc(hidden)]
 pub mod cpu;
-#[doc(hidden)]
-pub mod disc;
 mod error;
 #[doc(hidden)]
 pub mod fallback;
@@ -97,7 +95,7 @@ pub struct Settings {
     pub aperture: aperture::Aperture,
     /// Width of the soft rim, as a fraction of the radius, 0 to 1.
     pub rim: f32,
-    /// Number of separable terms; `None` uses that of the quality level, or sums discs of an even radius instead.
+    /// Number of separable terms; `None` uses that of the quality level.
     pub rank: Option<Rank>,
     /// Highlight recovery `M`: clipped white counts as `M` times as bright; 0 switches it off.
     pub highlights: f32,

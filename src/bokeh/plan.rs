@@ -20,10 +20,10 @@ use std::sync::Arc;
 
 use band::BandRows;
 
-use super::bank::FilterBank;
+use super::bank::{FilterBank, compensated_radius_px};
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
-use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, compensated_radius_px, scale_within};
+use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, scale_within};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -242,8 +242,6 @@ impl Plan {
             let scale = match self.compositing {
                 Compositing::Gather => 1,
                 _ if self.full_scale => scale_within(content.1, MAX_FULL_RADIUS_PX),
-                // Uniform radius.
-                Compositing::Select if content.0 == content.1 => self.level.uniform_scale(content.0),
                 _ => self.level.scale(content.0, content.1),
             };
             Bin {

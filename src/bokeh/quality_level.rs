@@ -1,6 +1,5 @@
 //! The quality levels of the blur, with their cost and parameters.
 
-use super::disc::MIN_RADIUS_PX;
 use crate::budget::Quality;
 
 /// Scales of a bin: pixels of the picture per bin pixel and axis.
@@ -44,7 +43,7 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
         bins_per_side: 2,
         near_from_px: 2.5,
         near_from_fraction: 0.07,
-        scale_from_px: [0.0, 3.0, 17.0, 34.0],
+        scale_from_px: [0.0, 2.5, 15.0, 30.0],
         max_bin_radius_px: 14.0,
         uniform_rank: 3,
     };
@@ -56,7 +55,7 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
             rank: 3,
             bins_per_side: 3,
             near_from_px: 2.0,
-            scale_from_px: [0.0, 3.5, 18.0, 40.0],
+            scale_from_px: [0.0, 3.5, 15.0, 30.0],
             uniform_rank: 4,
             ..fast
         },
@@ -65,7 +64,7 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
             rank: 4,
             bins_per_side: 4,
             near_from_px: 1.5,
-            scale_from_px: [0.0, 5.0, 20.0, 48.0],
+            scale_from_px: [0.0, 4.5, 18.0, 36.0],
             uniform_rank: 4,
             ..fast
         },
@@ -110,24 +109,4 @@ impl QualityLevel {
         let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
         fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, self.max_bin_radius_px))
     }
-
-    /// Returns the scale for a uniform radius, which shows in every pixel: one at which its disc is round.
-    pub fn uniform_scale(&self, radius_px: f32) -> usize {
-        let coarsest = self.scale(radius_px, radius_px);
-        let is_round = |scale: &usize| *scale <= coarsest && compensated_radius_px(radius_px, *scale) >= MIN_RADIUS_PX;
-        SCALES.into_iter().rev().find(is_round).unwrap_or(1)
-    }
-}
-
-/// Returns the radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
-///
-/// The tents down and up add (2 s^2 + 1) / 12 of variance each, per axis in pixels of the picture, and larger pixels
-/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. The added variance is subtracted from that of the disc.
-#[inline(always)]
-pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
-    if scale == 1 {
-        return coc_px;
-    }
-    let s = scale as f32;
-    (coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
 }

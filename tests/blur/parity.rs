@@ -17,7 +17,7 @@ use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
-use common::{COC_KINDS, Numbers, coc, codes_apart, color, depth, noise, shapes, three_depths};
+use common::{COC_KINDS, Numbers, coc, codes_apart, color, depth, noise, settings, shapes, three_depths};
 
 /// Limit of the difference of an 8-bit value, in codes: at most one in a thousand may exceed it, none may exceed its
 /// double. A radius between two nodes of the bank may round to either.
@@ -28,11 +28,6 @@ const RADIUS_PX: f32 = 1.0 / STEPS_PER_PX;
 const LIGHT_IN: f32 = 5e-4;
 /// Limit of the difference of a filtered bin.
 const LIGHT: f32 = 2e-3;
-
-/// Settings with a number of terms: only the CPU sums discs.
-fn settings(coc: CocKind) -> Settings {
-    Settings { rank: Some(Rank::Terms(3)), ..common::settings(coc) }
-}
 
 fn gpu(plan: &Plan) -> GpuBokeh {
     GpuBokeh::new(plan, false, None).expect("a Vulkan adapter, software included")
@@ -265,26 +260,6 @@ fn what_the_cpu_leaves_out_makes_no_difference() {
     for (name, metres) in [("far", 4.0), ("slightly far", 1.2), ("near", 0.5)] {
         let map = depth(width, height, |x, y| if x + y < 130 { metres } else { 1.0 + 1e-4 * (x % 7) as f32 });
         same(&settings(CocKind::Depth), &image, &map, &coc(CocKind::Depth, height), name);
-    }
-}
-
-/// The CPU sums discs, of which the GPU has the first terms.
-#[test]
-#[ignore = "needs a Vulkan adapter (software will do)"]
-fn discs_and_their_terms_nearly_agree() {
-    let (image, map) = (noise(150, 90), three_depths(150, 90));
-    for coc_kind in [CocKind::Uniform, CocKind::Depth] {
-        for quality in [Quality::Balanced, Quality::High, Quality::Best] {
-            let settings = Settings { quality, ..common::settings(coc_kind) };
-            let plan = Plan::new(&settings, 150, 90);
-            let (mut cpu, mut gpu, field) = (CpuBokeh::new(plan.clone(), Some(2)), gpu(&plan), coc(coc_kind, 90));
-            let mut summed = ColorImage::default();
-            cpu.blur(&image, Some(&map), &field, &mut summed).expect("the CPU blurs");
-            gpu.submit(job(0, &image, &map, &field)).expect("the GPU takes a frame");
-            let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
-            let db = common::psnr_db(finished.picture.memory().unwrap(), &summed);
-            assert!(db > 44.0, "{coc_kind:?} {quality}: {db:.1} dB");
-        }
     }
 }
 

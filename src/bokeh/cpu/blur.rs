@@ -12,13 +12,11 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::disc::DiscScratch;
 use super::filter::{
     BLOCK_ROWS, Taps, clamp_to_range, filter_column, filter_column_block, filter_row, max_row_len, row_len,
 };
 use super::rows::{COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips};
 use crate::bokeh::bank::FilterBank;
-use crate::bokeh::disc::DiscBank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
 use crate::compute::simd::{load, prefetch, store};
@@ -41,8 +39,6 @@ pub struct Strip<'a> {
     /// Radius and range of colours, from `reach`.
     pub edges: &'a SegmentEdges,
     pub bank: &'a FilterBank,
-    /// The aperture as discs, if its bin is summed, and the largest light in it.
-    pub discs: Option<(&'a DiscBank, f32)>,
     /// Largest radius of the bin, in bin pixels.
     pub max_radius_px: f32,
     /// Whether the bin covers every pixel.
@@ -72,7 +68,6 @@ pub struct Scratch {
     rows: Aligned,
     /// Rows of a strip with the filter support on both sides: `[BLOCK_ROWS][4][STRIP + 2 pad]`.
     lines: Aligned,
-    pub(super) discs: DiscScratch,
     /// Rows of cells that have content to filter.
     pub(super) filtered: Vec<bool>,
     /// Rows of cells whose result is made.
@@ -86,7 +81,6 @@ impl Scratch {
         Self {
             rows: Aligned::zeros(ring_capacity(half_width) * max_row_len(TERMS_PER_GROUP.min(plan.ladder.max_terms()))),
             lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * half_width.next_multiple_of(COPY_WIDTH))),
-            discs: DiscScratch::new(plan.ladder.discs.as_ref().map_or(0, DiscBank::max_half_width)),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
             made: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -101,11 +95,9 @@ impl WithSimd for Strip<'_> {
             return;
         }
         // A whole bin has coverage 1 everywhere, which needs no filter.
-        match (self.discs, self.whole) {
-            (Some(discs), true) => self.sum_discs::<S, 3>(simd, discs),
-            (Some(discs), false) => self.sum_discs::<S, 4>(simd, discs),
-            (None, true) => self.filter_groups::<S, 3>(simd),
-            (None, false) => self.filter_groups::<S, 4>(simd),
+        match self.whole {
+            true => self.filter_groups::<S, 3>(simd),
+            false => self.filter_groups::<S, 4>(simd),
         }
     }
 }
@@ -323,7 +315,8 @@ impl Strip<'_> {
         x: usize,
     ) -> Taps<'b, R> {
         let segment = x / SEGMENT;
-        let (left, right) = (self.bank.nearest_node(edges[segment][0]), self.bank.nearest_node(edges[segment + 1][0]));
+        let first_node = self.bank.first_node(self.scale);
+        let [left, right] = [segment, segment + 1].map(|edge| first_node + self.bank.nearest_node(edges[edge][0]));
         Taps {
             table,
             left: self.bank.tap_index(left, 0) + first,

@@ -9,7 +9,6 @@ mod blur;
 mod cell_sums;
 mod composite;
 mod directional;
-mod disc;
 mod encode;
 mod enlarge;
 mod fill;
@@ -155,7 +154,7 @@ impl CpuBokeh {
         } else {
             self.dilate_radii();
             lap("reach")?;
-            self.blur_bins(&frame);
+            self.blur_bins();
             lap("blur")?;
         }
         self.composite(&frame, pixels, out);

@@ -138,8 +138,8 @@ impl CpuBokeh {
     }
 
     /// Pass `blur`: each part is a strip. The strips of all bins are numbered consecutively, so that no thread idles.
-    pub(super) fn blur_bins(&mut self, frame: &InputFrame<'_>) {
-        let (plan, arch, max_light) = (&self.plan, self.arch, frame.max_light());
+    pub(super) fn blur_bins(&mut self) {
+        let (plan, arch) = (&self.plan, self.arch);
         let mut strip_parts: [Option<StripParts<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
@@ -158,9 +158,6 @@ impl CpuBokeh {
                 return;
             };
             let strip = part - strip_part.first;
-            let discs = plan.discs(bin).filter(|_| max_light.is_some());
-            let half_width =
-                discs.map_or_else(|| plan.bin_half_width(bin), |discs| discs.half_width(bin.max_radius_px));
             arch.dispatch(Strip {
                 source: strip_part.source,
                 size: (bin.width, bin.height),
@@ -169,11 +166,10 @@ impl CpuBokeh {
                 cells: strip_part.cells,
                 edges: strip_part.edges,
                 bank: &plan.bank,
-                discs: discs.zip(max_light),
                 max_radius_px: bin.max_radius_px,
                 whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
-                half_width,
+                half_width: plan.bin_half_width(bin),
                 strip,
                 out: strip_part.out.part(strip),
                 active: strip_part.active.part(strip),

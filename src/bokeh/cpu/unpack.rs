@@ -106,15 +106,6 @@ impl<'a> InputFrame<'a> {
         Self { size: (plan.width, plan.height), pixels, coc, matte, expansion }
     }
 
-    /// Returns the largest light of a pixel, if there is a bound.
-    pub fn max_light(&self) -> Option<f32> {
-        match self.pixels {
-            Pixels::Linear(_) => None,
-            _ if self.expansion.is_finite() => Some(expansion_factor(1.0, self.expansion)),
-            _ => Some(1.0),
-        }
-    }
-
     /// Unpacks some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
     pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, surfaces: &mut Surfaces<W>) {

@@ -6,7 +6,7 @@ use super::GpuBokeh;
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::cpu::CpuBokeh;
 use crate::bokeh::plan::Plan;
-use crate::bokeh::{Bokeh, BokehError, Job, Method, Rank, Settings};
+use crate::bokeh::{Bokeh, BokehError, Job, Method, Settings};
 use crate::budget::Quality;
 use crate::compute::GpuError;
 use crate::compute::device::{Device, SelfTest};
@@ -38,8 +38,7 @@ fn compare_with_cpu(device: &Arc<Device>) -> Result<SelfTest, BokehError> {
         method: Method::Layered,
         aperture: Aperture::default(),
         rim: 0.2,
-        // Only the CPU sums discs.
-        rank: Some(Rank::Terms(3)),
+        rank: None,
         highlights: 4.0,
         quality: Quality::default(),
         adaptive: false,

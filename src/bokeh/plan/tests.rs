@@ -64,5 +64,5 @@ fn borders_lie_where_no_pixels_do() {
 fn one_radius_needs_one_bin() {
     let plan = Plan::new(&settings(CocKind::Uniform, Quality::Balanced), 33, 17);
     assert_eq!(plan.bins.len(), 1);
-    assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (2, 17, 9));
+    assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (4, 9, 5));
 }

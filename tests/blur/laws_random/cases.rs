@@ -102,7 +102,6 @@ impl Random {
         }
     }
 
-    /// Often 0: plain discs are summed, all other apertures filtered.
     fn intensity(&mut self) -> f32 {
         let intensity = 2.0 * self.share() - 1.0;
         if intensity.abs() < 0.5 { 0.0 } else { intensity }
