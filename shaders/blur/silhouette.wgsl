@@ -1,7 +1,7 @@
 // Shared by passes that find silhouettes. Distances of a silhouette in pixels: up to where anything farther is visible
 // past it; the same if the farther surface is not in front of the subject; up to where the hidden background matters.
 // -1 if nowhere.
-// twin: src/bokeh/occlusion.rs (`Silhouette`), src/bokeh/cpu/marking.rs
+// twin: src/bokeh/occlusion.rs, src/bokeh/cpu/marking.rs
 
 const NO_SILHOUETTE = vec4(-1.0);
 

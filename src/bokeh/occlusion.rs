@@ -23,7 +23,7 @@ const FULLY_HIDDEN_FROM: f32 = 1.5;
 
 /// Side of a cell of the grid of silhouettes, in pixels.
 pub const SILHOUETTE_CELL: usize = 4;
-/// Number of distances stored per cell: the fields of [`Silhouette`].
+/// Number of distances stored per cell, see [`silhouette_between`].
 pub const DISTANCES_PER_CELL: usize = 3;
 /// Margin added to each distance, in pixels, because the grid is coarse and interpolated linearly. Not a whole number,
 /// so that both executors, which round differently, agree at whole radii.
@@ -34,18 +34,6 @@ pub const MARGIN_PX: f32 = 2.0 * SILHOUETTE_CELL as f32 + 0.3;
 pub const FADE_FRACTION: f32 = 0.36;
 /// A surface with less coverage than this does not fill a pixel.
 pub const MIN_OWN_COVERAGE: f32 = 0.05;
-
-/// An occlusion boundary: a CoC discontinuity between two neighbouring pixels. It bounds the nearer surface; its
-/// distances say how far from it the background matters, in pixels, -1 if not at all.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Silhouette {
-    /// Distance up to which anything farther is visible through the aperture: the radius of the nearer surface.
-    pub visible_px: f32,
-    /// Same distance if the farther surface is not in front of the subject, else -1.
-    pub background_visible_px: f32,
-    /// Distance up to which the hidden background matters: visible background is itself blurred.
-    pub needed_px: f32,
-}
 
 /// Returns the CoC above which a pixel is not in front of the subject: layers in front begin at this radius.
 #[inline(always)]
@@ -86,21 +74,18 @@ pub fn coc_similarity(a_px: f32, b_px: f32) -> f32 {
     1.0 / (1.0 + apart * apart)
 }
 
-impl Silhouette {
-    /// Returns the silhouette between two pixels with these CoC, if their step is at least `min_step_px` and larger
-    /// than that of a continuous surface ([`OTHER_SURFACE_FROM`]): quantisation of depth is no silhouette. In front of
-    /// the focal plane, layers in front begin at the radius `near_from_px`.
-    #[inline(always)]
-    pub fn between(a_px: f32, b_px: f32, min_step_px: f32, near_from_px: f32) -> Option<Self> {
-        let (near_px, far_px) = (a_px.min(b_px), a_px.max(b_px));
-        let visible_px = near_px.abs() + MARGIN_PX;
-        let background_visible_px = if far_px > front_px(near_from_px) { visible_px } else { -1.0 };
-        (excess_step_px(near_px, far_px, min_step_px) >= 0.0).then_some(Self {
-            visible_px,
-            background_visible_px,
-            needed_px: visible_px + far_px.abs(),
-        })
-    }
+/// Returns the distances from the silhouette between two pixels with these CoC, in pixels, -1 if nowhere: up to where
+/// anything farther is visible through the aperture, which is the radius of the nearer surface; the same if the farther
+/// surface is not in front of the subject; up to where the hidden background matters, as it is itself blurred. There is
+/// a silhouette if the step is at least `min_step_px` and larger than that of a continuous surface
+/// ([`OTHER_SURFACE_FROM`]): quantisation of depth is no silhouette. Layers in front begin at the radius `near_from_px`.
+#[inline(always)]
+pub fn silhouette_between(a_px: f32, b_px: f32, min_step_px: f32, near_from_px: f32) -> [f32; DISTANCES_PER_CELL] {
+    let (near_px, far_px) = if a_px < b_px { (a_px, b_px) } else { (b_px, a_px) };
+    let is_one = excess_step_px(near_px, far_px, min_step_px) >= 0.0;
+    let visible_px = if is_one { near_px.abs() + MARGIN_PX } else { -1.0 };
+    let background_visible_px = if far_px > front_px(near_from_px) { visible_px } else { -1.0 };
+    [visible_px, background_visible_px, if is_one { visible_px + far_px.abs() } else { -1.0 }]
 }
 
 impl Plan {

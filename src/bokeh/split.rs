@@ -41,17 +41,17 @@ pub struct CocRange {
 /// Histogram of a frame's CoC.
 #[derive(Clone, Debug)]
 pub struct CocHistogram {
-    /// Samples per bucket of `|c|`, behind and in front of the focal plane; pixels in focus are in no bucket.
-    sides: [[u32; BUCKETS]; 2],
-    /// Samples with a radius from [`SHARP_PX`] to the first bucket.
-    soft: u32,
-    /// Number of samples, including those in focus.
-    samples: u32,
+    /// Samples per bucket of `|c|`, behind and in front of the focal plane, and of those in focus: up to a radius of
+    /// [`SHARP_PX`], and from there to the first bucket.
+    counts: [u32; PLACES],
 }
+
+/// Number of counts of a histogram.
+const PLACES: usize = 2 * BUCKETS + 2;
 
 impl Default for CocHistogram {
     fn default() -> Self {
-        Self { sides: [[0; BUCKETS]; 2], soft: 0, samples: 0 }
+        Self { counts: [0; PLACES] }
     }
 }
 
@@ -68,20 +68,28 @@ impl CocHistogram {
 
     #[inline(always)]
     fn count_values(&mut self, values: &[f32], width: usize, coc_px_of: impl Fn(f32) -> f32) {
-        *self = Self::default();
+        // Several sets of counts, because a count waits for the last addition to it.
+        let mut counts = [[0u32; PLACES]; 4];
         let step = (width / SAMPLES_ACROSS).max(1);
+        let mut samples = [0.0; 2 * SAMPLES_ACROSS];
         for row in values.chunks_exact(width.max(1)).step_by(step) {
-            for &value in row.iter().step_by(step) {
-                let coc_px = coc_px_of(value);
-                let bucket = (coc_px.abs().to_bits() >> BUCKET_SHIFT).wrapping_sub(FIRST);
-                // In focus, below bucket 0, the difference wraps around.
-                if bucket < 1 << 16 {
-                    self.sides[usize::from(coc_px < 0.0)][(bucket as usize).min(BUCKETS - 1)] += 1;
+            let taken = samples.iter_mut().zip(row.iter().step_by(step)).map(|(to, &value)| *to = value).count();
+            let (chunks, rest) = samples[..taken].as_chunks::<16>();
+            for chunk in chunks {
+                let places = chunk.map(|value| place_of(coc_px_of(value)));
+                match places.iter().fold(0, |apart, place| apart | (place ^ places[0])) {
+                    0 => counts[0][places[0] as usize] += 16,
+                    _ => places.iter().enumerate().for_each(|(k, &place)| counts[k % 4][place as usize] += 1),
                 }
-                self.soft += u32::from(coc_px.abs() > SHARP_PX && coc_px.abs() < FOCUS_BORDER_PX);
-                self.samples += 1;
             }
+            rest.iter().for_each(|&value| counts[0][place_of(coc_px_of(value)) as usize] += 1);
         }
+        self.counts = std::array::from_fn(|place| counts.iter().map(|counts| counts[place]).sum());
+    }
+
+    /// Returns the samples per bucket behind the focal plane, or in front of it.
+    fn side(&self, near: bool) -> &[u32] {
+        &self.counts[usize::from(near) * BUCKETS..][..BUCKETS]
     }
 
     /// Splits one side into `ranges`, outwards from the focal plane, at most one per bin of the quality level, by
@@ -89,7 +97,7 @@ impl CocHistogram {
     /// pixels; in front it keeps everything up to `near_from_px`.
     pub fn split_side(&self, near: bool, level: &QualityLevel, near_from_px: f32, ranges: &mut Vec<CocRange>) -> f32 {
         ranges.clear();
-        let side = &self.sides[usize::from(near)];
+        let side = self.side(near);
         let bins = (level.bins_per_side as usize).min(MAX_RANGES);
         let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
         // Slightly defocused pixels in front belong to the subject, not to a layer of their own.
@@ -131,25 +139,30 @@ impl CocHistogram {
 
     /// Returns the fraction of the picture with a CoC between two borders around the focal plane that is not sharp.
     pub fn defocused_fraction(&self, low_px: f32, high_px: f32) -> f32 {
-        let within = |near: bool, border_px: f32| -> u32 {
-            self.sides[usize::from(near)][..bucket_of(border_px.min(f32::MAX))].iter().sum()
-        };
-        (self.soft + within(false, high_px) + within(true, -low_px)) as f32 / self.samples.max(1) as f32
+        let within =
+            |near: bool, border_px: f32| -> u32 { self.side(near)[..bucket_of(border_px.min(f32::MAX))].iter().sum() };
+        let soft = self.counts[PLACES - 1];
+        (soft + within(false, high_px) + within(true, -low_px)) as f32 / self.samples().max(1) as f32
+    }
+
+    /// Returns the number of samples, including those in focus.
+    fn samples(&self) -> u32 {
+        self.counts.iter().sum()
     }
 
     /// Returns prefix sums over the buckets of w, w ln |c| and w (ln |c|)^2, where w is the fraction of the picture.
     fn sum_buckets(&self, near: bool) -> [[f64; 3]; BUCKETS + 1] {
-        let mut sums = [[0.0f64; 3]; BUCKETS + 1];
-        for (k, &n) in self.sides[usize::from(near)].iter().enumerate() {
+        let (mut sums, samples) = ([[0.0f64; 3]; BUCKETS + 1], f64::from(self.samples()));
+        for (k, &n) in self.side(near).iter().enumerate() {
             // A constant factor on |c| (1.04: within the bucket) changes no variance.
-            let (fraction, log) = (f64::from(n) / f64::from(self.samples), (f64::from(bucket_edge_px(k)) * 1.04).ln());
+            let (fraction, log) = (f64::from(n) / samples, (f64::from(bucket_edge_px(k)) * 1.04).ln());
             sums[k + 1] = [sums[k][0] + fraction, sums[k][1] + fraction * log, sums[k][2] + fraction * log * log];
         }
         sums
     }
 
     /// Returns the range of buckets `from..to`, with its border in the empty buckets before it.
-    fn range_of_buckets(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> CocRange {
+    fn range_of_buckets(&self, side: &[u32], from: usize, to: usize) -> CocRange {
         let total: u32 = side[from..to].iter().sum();
         let first = (from..to).find(|&k| side[k] > 0).unwrap_or(from);
         let mut strays = (STRAY_FRACTION * total as f32) as u32;
@@ -168,6 +181,17 @@ impl CocHistogram {
             high_px: bucket_edge_px(high + 1),
         }
     }
+}
+
+/// Returns where a CoC is counted.
+#[inline(always)]
+fn place_of(coc_px: f32) -> u32 {
+    let bucket = (coc_px.abs().to_bits() >> BUCKET_SHIFT) as i32 - FIRST as i32;
+    let outermost = BUCKETS as i32 - 1;
+    let bucket = if bucket < outermost { bucket } else { outermost };
+    let defocused = bucket + if coc_px < 0.0 { BUCKETS as i32 } else { 0 };
+    let in_focus = 2 * BUCKETS as i32 + i32::from(coc_px.abs() > SHARP_PX);
+    (if bucket < 0 { in_focus } else { defocused }) as u32
 }
 
 /// Largest number of ranges per side.

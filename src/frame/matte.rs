@@ -68,6 +68,21 @@ impl Matte {
         let most = &from_start[..from_start.len().min(range.len())];
         &most[..until(most, range.end)]
     }
+
+    /// Returns the mixed pixels of some rows of a picture, each with its column and row.
+    pub fn pixels_in_rows(
+        &self,
+        rows: Range<usize>,
+        width: usize,
+    ) -> impl Iterator<Item = (usize, usize, &MixedPixel)> {
+        let (mut y, mut start) = (rows.start, rows.start * width);
+        self.pixels_in(start..rows.end * width).iter().map(move |pixel| {
+            while pixel.at as usize >= start + width {
+                (y, start) = (y + 1, start + width);
+            }
+            (pixel.at as usize - start, y, pixel)
+        })
+    }
 }
 
 #[cfg(test)]

@@ -223,9 +223,11 @@ impl Band<'_> {
                 Content::One(_) => Row::Whole(radius_px),
                 Content::Mixed => {
                     let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-                    extend_range(&mut range, std::iter::once(&surfaces.back.0[3][..padded]), |coc_px| coc_px);
+                    extend_range(simd, &mut range, std::iter::once(&surfaces.back.0[3][..padded]), |coc_px| coc_px);
                     if surfaces.mixed {
-                        extend_range(&mut range, std::iter::once(&surfaces.front.0[3][..padded]), |coc_px| coc_px);
+                        extend_range(simd, &mut range, std::iter::once(&surfaces.front.0[3][..padded]), |coc_px| {
+                            coc_px
+                        });
                     }
                     Row::Weighted(range)
                 }

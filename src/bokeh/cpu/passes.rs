@@ -14,7 +14,7 @@ use super::tiles::{BLOCK, ComputeTileRanges, TILE_H};
 use super::unpack::InputFrame;
 use super::{CpuBokeh, ThreadScratch};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::occlusion::MAX_LAYERS;
+use crate::bokeh::occlusion::{DISTANCES_PER_CELL, MAX_LAYERS};
 use crate::bokeh::plan::MAX_BINS;
 use crate::compute::thread_pool::DisjointParts;
 
@@ -49,7 +49,10 @@ impl CpuBokeh {
                 let marks = marks.part(row);
                 arch.dispatch(MarkSilhouettes { source: frame, ranges, rows, marks, near_from_px });
             });
-            self.silhouettes.dilate(&mut self.workers, arch);
+            // With nothing in front, no background is inpainted.
+            let planes =
+                if self.plan.bins.iter().any(|bin| bin.near) { DISTANCES_PER_CELL } else { DISTANCES_PER_CELL - 1 };
+            self.silhouettes.dilate(planes, &mut self.workers, arch);
         } else {
             self.tiles.set_ranges(frame.coc);
         }

@@ -12,7 +12,7 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::encode::CHUNK;
 use crate::bokeh::occlusion::{DISTANCES_PER_CELL, SILHOUETTE_CELL};
@@ -32,11 +32,20 @@ pub struct Silhouettes {
     marks: Vec<f32>,
     /// After the dilation along rows: the maximum over silhouettes of radius^2 - distance^2.
     row_dilated: Vec<f32>,
-    /// Maximum of each line of `row_dilated`, `[row][DISTANCES_PER_CELL]`.
-    line_maxima: Vec<f32>,
+    /// Of `row_dilated`, `[row][DISTANCES_PER_CELL]`.
+    lines: Vec<Line>,
     /// After the dilation along rows and columns: above 0 within the radius of a silhouette.
     dilated: Vec<f32>,
-    taken: Vec<AtomicBool>,
+    taken: [Vec<AtomicBool>; 3],
+}
+
+/// What a line of `row_dilated` holds.
+#[derive(Clone)]
+struct Line {
+    /// Maximum of radius^2; [`NO_SILHOUETTE`] if the line has no silhouette and is not written.
+    top: f32,
+    /// Cells within the radius of a silhouette.
+    cells: Range<usize>,
 }
 
 impl Silhouettes {
@@ -44,55 +53,38 @@ impl Silhouettes {
     pub fn new(width: usize, height: usize) -> Self {
         let (across, down) = (width.div_ceil(SILHOUETTE_CELL), height.div_ceil(SILHOUETTE_CELL));
         let cells = vec![NO_SILHOUETTE; across * DISTANCES_PER_CELL * down];
-        let taken = std::iter::repeat_with(|| AtomicBool::new(false)).take(down).collect();
-        let line_maxima = vec![NO_SILHOUETTE; DISTANCES_PER_CELL * down];
-        Self { across, down, marks: cells.clone(), row_dilated: cells.clone(), line_maxima, dilated: cells, taken }
+        let taken = [(); 3].map(|()| std::iter::repeat_with(|| AtomicBool::new(false)).take(down).collect());
+        let lines = vec![Line { top: NO_SILHOUETTE, cells: 0..0 }; DISTANCES_PER_CELL * down];
+        Self { across, down, marks: cells.clone(), row_dilated: cells.clone(), lines, dilated: cells, taken }
     }
 
     /// Returns the marks, to be written in parts of `rows` rows of the picture, whole rows of the grid.
     pub fn marks(&mut self, rows: usize) -> DisjointParts<'_, f32> {
-        DisjointParts::new(&mut self.marks, rows / SILHOUETTE_CELL * DISTANCES_PER_CELL * self.across, &mut self.taken)
+        let len = rows / SILHOUETTE_CELL * DISTANCES_PER_CELL * self.across;
+        DisjointParts::new(&mut self.marks, len, &mut self.taken[0])
     }
 
-    /// Dilates the marks by their radii, along the rows and then down the columns.
-    pub fn dilate(&mut self, workers: &mut ThreadPool, arch: Arch) {
-        let (across, row_len, down) = (self.across, self.across * DISTANCES_PER_CELL, self.down);
+    /// Dilates the marks by their radii, along the rows and then down the columns; only the first `planes` distances.
+    pub fn dilate(&mut self, planes: usize, workers: &mut ThreadPool, arch: Arch) {
+        let (across, down) = (self.across, self.down);
+        let lines_per_item = ROWS_PER_ITEM * DISTANCES_PER_CELL;
         let marks = &self.marks;
-        let parts = DisjointParts::new(&mut self.row_dilated, ROWS_PER_ITEM * row_len, &mut self.taken);
+        let [taken, taken_lines, taken_scratch] = &mut self.taken;
+        let row_dilated = DisjointParts::new(&mut self.row_dilated, lines_per_item * across, taken);
+        let lines = DisjointParts::new(&mut self.lines, lines_per_item, taken_lines);
+        // The result is written last, so its memory is free: at least one row of it.
+        let scratch = DisjointParts::new(&mut self.dilated, lines_per_item * across, taken_scratch);
         workers.run(down.div_ceil(ROWS_PER_ITEM), &|part| {
-            let rows = parts.part(part);
-            let marks = &marks[part * ROWS_PER_ITEM * row_len..][..rows.len()];
-            arch.dispatch(|| {
-                for (out, marks) in rows.chunks_exact_mut(across).zip(marks.chunks_exact(across)) {
-                    dilate_row(marks, out);
-                }
-            });
+            let (out, lines, padded) = (row_dilated.part(part), lines.part(part), scratch.part(part));
+            let marks = &marks[part * lines_per_item * across..][..out.len()];
+            arch.dispatch(DilateRows { marks, planes, padded, lines, out });
         });
-        arch.dispatch(|| {
-            for (top, line) in self.line_maxima.iter_mut().zip(self.row_dilated.chunks_exact(across)) {
-                *top = maximum(line);
-            }
-        });
-        let (row_dilated, line_maxima) = (&self.row_dilated, &self.line_maxima);
-        let radius = radius_in_cells(maximum(line_maxima));
-        let parts = DisjointParts::new(&mut self.dilated, ROWS_PER_ITEM * row_len, &mut self.taken);
+        let (row_dilated, lines) = (&self.row_dilated, &self.lines);
+        let radius = radius_in_cells(lines.iter().fold(0.0, |top, line| line.top.max(top)));
+        let parts = DisjointParts::new(&mut self.dilated, lines_per_item * across, taken);
         workers.run(down.div_ceil(ROWS_PER_ITEM), &|part| {
-            let rows = parts.part(part);
-            arch.dispatch(|| {
-                for (line, out) in (part * ROWS_PER_ITEM * DISTANCES_PER_CELL..).zip(rows.chunks_exact_mut(across)) {
-                    let (y, plane) = (line / DISTANCES_PER_CELL, line % DISTANCES_PER_CELL);
-                    out.fill(NO_SILHOUETTE);
-                    for other in y.saturating_sub(radius)..(y + radius + 1).min(down) {
-                        let (from, distance_px) =
-                            (other * DISTANCES_PER_CELL + plane, (other.abs_diff(y) * SILHOUETTE_CELL) as f32);
-                        let distance_square = distance_px * distance_px;
-                        // Most lines have no silhouette, or none with a radius that large.
-                        if line_maxima[from] - distance_square > NO_SILHOUETTE {
-                            assign_max_offset(out, &row_dilated[from * across..][..across], distance_square);
-                        }
-                    }
-                }
-            });
+            let (out, first) = (parts.part(part), part * lines_per_item);
+            arch.dispatch(DilateColumns { row_dilated, lines, planes, radius, first, out });
         });
     }
 
@@ -196,25 +188,137 @@ fn radius_in_cells(square: f32) -> usize {
     if square < 0.0 { 0 } else { square.sqrt() as usize / SILHOUETTE_CELL + 1 }
 }
 
-/// Dilates the marks of a row along it, one by one: there are few.
-#[inline(always)]
-fn dilate_row(marks: &[f32], out: &mut [f32]) {
-    out.fill(NO_SILHOUETTE);
-    for (x, &px) in marks.iter().enumerate().filter(|&(_, &px)| px > 0.0) {
-        let radius = radius_in_cells(px * px);
-        let first = x.saturating_sub(radius);
-        for (to, out) in (first..).zip(&mut out[first..(x + radius + 1).min(marks.len())]) {
-            let distance_px = (to.abs_diff(x) * SILHOUETTE_CELL) as f32;
-            let square = if px > distance_px { px * px - distance_px * distance_px } else { NO_SILHOUETTE };
-            *out = if square > *out { square } else { *out };
+/// Dilates lines of marks along the rows.
+struct DilateRows<'a> {
+    marks: &'a [f32],
+    planes: usize,
+    /// Scratch for three lines.
+    padded: &'a mut [f32],
+    lines: &'a mut [Line],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for DilateRows<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let across = self.marks.len() / self.lines.len();
+        let marks = self.marks.chunks_exact(across);
+        for (index, ((line, marks), out)) in
+            self.lines.iter_mut().zip(marks).zip(self.out.chunks_exact_mut(across)).enumerate()
+        {
+            let highest_px = if index % DISTANCES_PER_CELL < self.planes { maximum(marks) } else { NO_SILHOUETTE };
+            *line = Line { top: NO_SILHOUETTE, cells: 0..0 };
+            if highest_px <= 0.0 {
+                continue;
+            }
+            let is_marked = |&px: &f32| px > 0.0;
+            let first = marks.iter().position(is_marked).unwrap_or(0);
+            let last = marks.iter().rposition(is_marked).unwrap_or(0);
+            line.top = highest_px * highest_px;
+            let reach = radius_in_cells(line.top).min(across);
+            line.cells = first.saturating_sub(reach)..(last + reach + 1).min(across);
+            let padded = &mut self.padded[..across + 2 * reach];
+            padded.fill(NO_SILHOUETTE);
+            for (square, &px) in padded[reach..].iter_mut().zip(marks) {
+                *square = if px > 0.0 { px * px } else { NO_SILHOUETTE };
+            }
+            out.fill(NO_SILHOUETTE);
+            for_each_group(line.cells.clone(), across, |x, is_whole| match is_whole {
+                true => dilate_cells::<GROUP>(padded, x, reach, &mut out[x..]),
+                false => dilate_cells::<1>(padded, x, reach, &mut out[x..]),
+            });
         }
     }
 }
 
+/// Cells computed together.
+const GROUP: usize = 32;
+
+/// Calls `work` with the start of groups that cover some cells of a line, whole ones or single cells if it is short.
 #[inline(always)]
-fn assign_max_offset(out: &mut [f32], along: &[f32], distance_square: f32) {
-    for (out, &square) in out.iter_mut().zip(along) {
-        let left = square - distance_square;
-        *out = if left > *out { left } else { *out };
+fn for_each_group(cells: Range<usize>, across: usize, mut work: impl FnMut(usize, bool)) {
+    let is_whole = across >= GROUP;
+    for x in cells.step_by(if is_whole { GROUP } else { 1 }) {
+        // The last group overlaps the one before.
+        work(if is_whole { x.min(across - GROUP) } else { x }, is_whole);
     }
+}
+
+/// Computes the highest radius^2 - distance^2 of the silhouettes around `N` cells from column `x` on, given radius^2 in
+/// a line `padded` by `reach` cells.
+#[inline(always)]
+fn dilate_cells<const N: usize>(padded: &[f32], x: usize, reach: usize, out: &mut [f32]) {
+    let mut highest = [NO_SILHOUETTE; N];
+    highest.copy_from_slice(&padded[x + reach..][..N]);
+    for distance in 1..=reach {
+        let (before, after) = (&padded[x + reach - distance..][..N], &padded[x + reach + distance..][..N]);
+        let distance_px = (distance * SILHOUETTE_CELL) as f32;
+        for k in 0..N {
+            let square = if before[k] > after[k] { before[k] } else { after[k] } - distance_px * distance_px;
+            highest[k] = if square > highest[k] { square } else { highest[k] };
+        }
+    }
+    for k in 0..N {
+        out[k] = if highest[k] > 0.0 { highest[k] } else { NO_SILHOUETTE };
+    }
+}
+
+/// Dilates lines down the columns, from line `first` on.
+struct DilateColumns<'a> {
+    row_dilated: &'a [f32],
+    lines: &'a [Line],
+    planes: usize,
+    /// Largest radius, in cells.
+    radius: usize,
+    first: usize,
+    out: &'a mut [f32],
+}
+
+impl WithSimd for DilateColumns<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (across, down) = (self.row_dilated.len() / self.lines.len(), self.lines.len() / DISTANCES_PER_CELL);
+        for (line, out) in (self.first..).zip(self.out.chunks_exact_mut(across)) {
+            let (y, plane) = (line / DISTANCES_PER_CELL, line % DISTANCES_PER_CELL);
+            if plane >= self.planes {
+                continue;
+            }
+            // Most lines have no silhouette, or none with a radius that large.
+            let near = (y.saturating_sub(self.radius)..(y + self.radius + 1).min(down)).filter_map(|other| {
+                let (from, distance_px) =
+                    (other * DISTANCES_PER_CELL + plane, (other.abs_diff(y) * SILHOUETTE_CELL) as f32);
+                (self.lines[from].top - distance_px * distance_px > NO_SILHOUETTE).then_some((from, distance_px * distance_px))
+            });
+            let (first, end) = near.clone().fold((across, 0), |(first, end), (from, _)| {
+                (first.min(self.lines[from].cells.start), end.max(self.lines[from].cells.end))
+            });
+            out.fill(NO_SILHOUETTE);
+            for_each_group(first..end, across, |x, is_whole| match is_whole {
+                true => highest_of_lines::<GROUP>(self.row_dilated, across, near.clone(), x, out),
+                false => highest_of_lines::<1>(self.row_dilated, across, near.clone(), x, out),
+            });
+        }
+    }
+}
+
+/// Computes the highest of some lines, each minus its squared distance, in `N` cells from column `x` on.
+#[inline(always)]
+fn highest_of_lines<const N: usize>(
+    row_dilated: &[f32],
+    across: usize,
+    lines: impl Iterator<Item = (usize, f32)>,
+    x: usize,
+    out: &mut [f32],
+) {
+    let mut highest = [NO_SILHOUETTE; N];
+    for (line, distance_square) in lines {
+        let squares = &row_dilated[line * across + x..][..N];
+        for k in 0..N {
+            let left = squares[k] - distance_square;
+            highest[k] = if left > highest[k] { left } else { highest[k] };
+        }
+    }
+    out[x..x + N].copy_from_slice(&highest);
 }

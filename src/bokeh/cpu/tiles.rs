@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use pulp::Simd;
+
 use super::pixels::Radii;
 use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
@@ -98,11 +100,8 @@ impl Tiles {
                 }
             }
         }
-        for pixel in matte.iter().flat_map(|matte| &matte.pixels) {
-            let (x, y) = (pixel.at as usize % plan.width, pixel.at as usize / plan.width);
-            if let Some(only) = self.only.get_mut(y / TILE_H * self.across + x / TILE_W) {
-                *only = NO_BIN;
-            }
+        for (x, y, _) in matte.iter().flat_map(|matte| matte.pixels_in_rows(0..plan.height, plan.width)) {
+            self.only[y / TILE_H * self.across + x / TILE_W] = NO_BIN;
         }
     }
 
@@ -160,7 +159,7 @@ pub struct ComputeTileRanges<'a> {
 impl pulp::WithSimd for ComputeTileRanges<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let (width, height) = self.source.size;
         // CoC grows with depth: if the two pictures have the same size, the CoC range follows from the depth range.
         let direct = match self.source.coc {
@@ -176,20 +175,22 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
                 let x0 = tile * TILE_W;
                 let row = |y: usize| &map.metres[y * width + x0..][..TILE_W.min(width - x0)];
                 // Unknown depth counts as infinite.
-                extend_range(range, rows.clone().map(row), |metres| if metres > 0.0 { metres } else { f32::INFINITY });
+                extend_range(simd, range, rows.clone().map(row), |metres| {
+                    let is_known = simd.greater_than_f32s(metres, simd.splat_f32s(0.0));
+                    simd.select_f32s(is_known, metres, simd.splat_f32s(f32::INFINITY))
+                });
             }
         } else {
-            for y in rows {
+            for y in rows.clone() {
                 compute_coc_row(self.source, y, 0, self.coc);
                 for (range, values) in self.ranges.iter_mut().zip(self.coc.chunks(TILE_W)) {
-                    extend_range(range, std::iter::once(values), |coc_px| coc_px);
+                    extend_range(simd, range, std::iter::once(values), |coc_px| coc_px);
                 }
             }
         }
         if let Some(matte) = self.source.matte {
-            let rows = self.row * TILE_H * width..((self.row + 1) * TILE_H).min(height) * width;
-            for pixel in matte.pixels_in(rows) {
-                let (low, high) = &mut self.ranges[pixel.at as usize % width / TILE_W];
+            for (x, _, pixel) in matte.pixels_in_rows(rows, width) {
+                let (low, high) = &mut self.ranges[x / TILE_W];
                 (*low, *high) = (low.min(pixel.near_m), high.max(pixel.far_m));
             }
         }
@@ -201,30 +202,21 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
 
 /// Widens a range by the values of some rows, each mapped by `of`.
 #[inline(always)]
-pub fn extend_range<'a>(range: &mut (f32, f32), rows: impl Iterator<Item = &'a [f32]>, of: impl Fn(f32) -> f32) {
-    let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
+pub fn extend_range<'a, S: Simd>(
+    simd: S,
+    range: &mut (f32, f32),
+    rows: impl Iterator<Item = &'a [f32]>,
+    of: impl Fn(S::f32s) -> S::f32s,
+) {
+    // Explicit vectors, because the compiler would shuffle values for the reduction at every step.
+    let (mut low, mut high) = (simd.splat_f32s(range.0), simd.splat_f32s(range.1));
     for row in rows {
-        let (vectors, rest) = row.as_chunks::<16>();
-        for values in vectors {
-            for k in 0..16 {
-                let value = of(values[k]);
-                low[k] = if value < low[k] { value } else { low[k] };
-                high[k] = if value > high[k] { value } else { high[k] };
-            }
-        }
-        for &value in rest {
-            let value = of(value);
-            (low[0], high[0]) = (low[0].min(value), high[0].max(value));
+        let (vectors, rest) = S::as_simd_f32s(row);
+        for value in vectors.iter().copied().chain(rest.iter().map(|&value| simd.splat_f32s(value))) {
+            (low, high) = (simd.min_f32s(low, of(value)), simd.max_f32s(high, of(value)));
         }
     }
-    // Reduction in halves, because a sequential one would wait for each value.
-    for half in [8, 4, 2, 1] {
-        for k in 0..half {
-            low[k] = if low[k + half] < low[k] { low[k + half] } else { low[k] };
-            high[k] = if high[k + half] > high[k] { high[k + half] } else { high[k] };
-        }
-    }
-    (range.0, range.1) = (range.0.min(low[0]), range.1.max(high[0]));
+    *range = (simd.reduce_min_f32s(low), simd.reduce_max_f32s(high));
 }
 
 /// Erosion: a tile stays set if its whole neighbourhood is set.
@@ -234,10 +226,11 @@ fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (
             *out = row[x.saturating_sub(NEIGHBOURHOOD.0)..(x + NEIGHBOURHOOD.0 + 1).min(across)].iter().all(|&set| set);
         }
     }
-    for y in 0..down {
-        for x in 0..across {
-            to[y * across + x] = (y.saturating_sub(NEIGHBOURHOOD.1)..(y + NEIGHBOURHOOD.1 + 1).min(down))
-                .all(|y| scratch[y * across + x]);
+    for (y, out) in to.chunks_exact_mut(across).enumerate() {
+        out.fill(true);
+        let rows = y.saturating_sub(NEIGHBOURHOOD.1)..(y + NEIGHBOURHOOD.1 + 1).min(down);
+        for row in scratch[rows.start * across..rows.end * across].chunks_exact(across) {
+            out.iter_mut().zip(row).for_each(|(out, set)| *out &= set);
         }
     }
 }

@@ -273,7 +273,7 @@ pub fn compute_coc_row(source: &InputFrame<'_>, y: usize, x0: usize, coc: &mut [
 /// Returns the sample, of a row of `of` values, at pixel `index` of `pixels`.
 #[inline(always)]
 pub fn nearest_sample(index: usize, pixels: usize, of: usize) -> usize {
-    ((2 * index + 1) * of / (2 * pixels)).min(of - 1)
+    if of == pixels { index } else { ((2 * index + 1) * of / (2 * pixels)).min(of - 1) }
 }
 
 #[cfg(test)]

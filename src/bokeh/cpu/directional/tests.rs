@@ -1,5 +1,6 @@
 use super::super::rows::PlanarRows;
 use super::*;
+use crate::bokeh::occlusion::DISTANCES_PER_CELL;
 
 const WIDTH: usize = 64;
 const HEIGHT: usize = 48;
@@ -26,7 +27,7 @@ fn everywhere() -> Silhouettes {
     let mut silhouettes = Silhouettes::new(PIXEL * WIDTH, PIXEL * HEIGHT);
     let marks = silhouettes.marks(PIXEL * HEIGHT);
     marks.part(0).fill(1e3);
-    silhouettes.dilate(&mut ThreadPool::new("spread", 1), Arch::new());
+    silhouettes.dilate(DISTANCES_PER_CELL, &mut ThreadPool::new("spread", 1), Arch::new());
     silhouettes
 }
 
