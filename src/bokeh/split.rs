@@ -1,6 +1,8 @@
 //! Depth slicing by histogram: bin borders lie where few pixels are, so that a surface stays in one bin and two
 //! surfaces do not share one. A flat background then costs one bin, however wide the possible range.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::quality_level::{FOCUS_BORDER_PX, QualityLevel};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
@@ -58,33 +60,13 @@ impl Default for CocHistogram {
 impl CocHistogram {
     /// Counts the pixels of a frame on a subsampled grid.
     pub fn count_depth(&mut self, depth: &DepthMap, lens: &DepthCoc) {
-        self.count_values(&depth.metres, depth.width as usize, |metres| lens.coc_px(metres));
+        let coc_px_of = |metres| lens.coc_px(metres);
+        self.counts = Arch::new().dispatch(Count { values: &depth.metres, width: depth.width as usize, coc_px_of });
     }
 
     /// Same as [`CocHistogram::count_depth`] for radii, `width` per row.
     pub fn count_radii(&mut self, coc_px: &[f32], width: usize) {
-        self.count_values(coc_px, width, |coc_px| coc_px);
-    }
-
-    #[inline(always)]
-    fn count_values(&mut self, values: &[f32], width: usize, coc_px_of: impl Fn(f32) -> f32) {
-        // Several sets of counts, because a count waits for the last addition to it.
-        let mut counts = [[0u32; PLACES]; 4];
-        let step = (width / SAMPLES_ACROSS).max(1);
-        let mut samples = [0.0; 2 * SAMPLES_ACROSS];
-        for row in values.chunks_exact(width.max(1)).step_by(step) {
-            let taken = samples.iter_mut().zip(row.iter().step_by(step)).map(|(to, &value)| *to = value).count();
-            let (chunks, rest) = samples[..taken].as_chunks::<16>();
-            for chunk in chunks {
-                let places = chunk.map(|value| place_of(coc_px_of(value)));
-                match places.iter().fold(0, |apart, place| apart | (place ^ places[0])) {
-                    0 => counts[0][places[0] as usize] += 16,
-                    _ => places.iter().enumerate().for_each(|(k, &place)| counts[k % 4][place as usize] += 1),
-                }
-            }
-            rest.iter().for_each(|&value| counts[0][place_of(coc_px_of(value)) as usize] += 1);
-        }
-        self.counts = std::array::from_fn(|place| counts.iter().map(|counts| counts[place]).sum());
+        self.counts = Arch::new().dispatch(Count { values: coc_px, width, coc_px_of: |coc_px| coc_px });
     }
 
     /// Returns the samples per bucket behind the focal plane, or in front of it.
@@ -180,6 +162,40 @@ impl CocHistogram {
             low_px: bucket_edge_px(low.unwrap_or(first)),
             high_px: bucket_edge_px(high + 1),
         }
+    }
+}
+
+/// Counts values on a subsampled grid by their CoC, `width` per row.
+struct Count<'a, F> {
+    values: &'a [f32],
+    width: usize,
+    coc_px_of: F,
+}
+
+impl<F: Fn(f32) -> f32> WithSimd for Count<'_, F> {
+    type Output = [u32; PLACES];
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [u32; PLACES] {
+        // Several sets of counts, because a count waits for the last addition to it.
+        let mut counts = [[0u32; PLACES]; 4];
+        let step = (self.width / SAMPLES_ACROSS).max(1);
+        let mut samples = [0.0; 2 * SAMPLES_ACROSS];
+        for row in self.values.chunks_exact(self.width.max(1)).step_by(step) {
+            let taken = samples.iter_mut().zip(row.iter().step_by(step)).map(|(to, &value)| *to = value).count();
+            let (chunks, rest) = samples[..taken].as_chunks::<16>();
+            for chunk in chunks {
+                let mut places = [0; 16];
+                for (place, &value) in places.iter_mut().zip(chunk) {
+                    *place = place_of((self.coc_px_of)(value));
+                }
+                match places.iter().fold(0, |apart, place| apart | (place ^ places[0])) {
+                    0 => counts[0][places[0] as usize] += 16,
+                    _ => places.iter().enumerate().for_each(|(k, &place)| counts[k % 4][place as usize] += 1),
+                }
+            }
+            rest.iter().for_each(|&value| counts[0][place_of((self.coc_px_of)(value)) as usize] += 1);
+        }
+        std::array::from_fn(|place| counts.iter().map(|counts| counts[place]).sum())
     }
 }
 

@@ -69,14 +69,14 @@ impl Matte {
         &most[..until(most, range.end)]
     }
 
-    /// Returns the mixed pixels of some rows of a picture, each with its column and row.
-    pub fn pixels_in_rows(
-        &self,
-        rows: Range<usize>,
+    /// Returns column and row of some of the mixed pixels of a picture, none before row `y`.
+    pub fn locate(
+        pixels: &[MixedPixel],
+        mut y: usize,
         width: usize,
     ) -> impl Iterator<Item = (usize, usize, &MixedPixel)> {
-        let (mut y, mut start) = (rows.start, rows.start * width);
-        self.pixels_in(start..rows.end * width).iter().map(move |pixel| {
+        let mut start = y * width;
+        pixels.iter().map(move |pixel| {
             while pixel.at as usize >= start + width {
                 (y, start) = (y + 1, start + width);
             }

@@ -223,11 +223,9 @@ impl Band<'_> {
                 Content::One(_) => Row::Whole(radius_px),
                 Content::Mixed => {
                     let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-                    extend_range(simd, &mut range, std::iter::once(&surfaces.back.0[3][..padded]), |coc_px| coc_px);
+                    extend_range(simd, &mut range, &surfaces.back.0[3][..padded]);
                     if surfaces.mixed {
-                        extend_range(simd, &mut range, std::iter::once(&surfaces.front.0[3][..padded]), |coc_px| {
-                            coc_px
-                        });
+                        extend_range(simd, &mut range, &surfaces.front.0[3][..padded]);
                     }
                     Row::Weighted(range)
                 }

@@ -9,10 +9,11 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::pixels::Radii;
-use super::silhouettes::{NO_SILHOUETTE, maximum};
+use super::silhouettes::NO_SILHOUETTE;
 use super::tiles::TILE_W;
 use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::occlusion::{DISTANCES_PER_CELL, SILHOUETTE_CELL, excess_step_px, silhouette_between};
+use crate::frame::{Matte, MixedPixel};
 use crate::optics::CocField;
 
 /// Marks the silhouettes of a row of tiles.
@@ -23,6 +24,8 @@ pub struct MarkSilhouettes<'a> {
     /// Rows of the picture; `marks` are the rows of the grid over them.
     pub rows: Range<usize>,
     pub marks: &'a mut [f32],
+    /// Mixed pixels in these rows.
+    pub mixed: &'a [MixedPixel],
     /// Radius from which something in front is a layer of its own, in pixels.
     pub near_from_px: f32,
 }
@@ -57,26 +60,26 @@ impl MarkSilhouettes<'_> {
     fn mark_steps(&mut self, x0: usize, min_step_px: f32) {
         let (source, near_from_px) = (self.source, self.near_from_px);
         let (width, height) = source.size;
-        let (across, count) = (width.div_ceil(SILHOUETTE_CELL), (TILE_W + 1).min(width - x0));
-        // The outermost pixels repeat.
-        let compute_row = |y: usize, coc_px: &mut [f32; TILE_W + 1]| {
-            compute_coc_row(source, y.min(height - 1), x0, &mut coc_px[..count]);
-            let last_px = coc_px[count - 1];
-            coc_px[count..].fill(last_px);
-        };
-        let [mut here, mut below] = [[0.0; TILE_W + 1]; 2];
-        compute_row(self.rows.start, &mut here);
+        let (across, last) = (width.div_ceil(SILHOUETTE_CELL), TILE_W.min(width - x0 - 1));
+        let mut below = [0.0; TILE_W + 1];
+        compute_coc_row(source, self.rows.start, x0, &mut below[..=last]);
         for (k, y) in self.rows.clone().enumerate() {
-            compute_row(y + 1, &mut below);
-            let mut excess_px = [f32::MIN; TILE_W];
+            let mut here = below;
+            compute_coc_row(source, (y + 1).min(height - 1), x0, &mut below[..=last]);
+            // The outermost pixels repeat.
+            for row in [&mut here, &mut below] {
+                let last_px = row[last];
+                row[last..].fill(last_px);
+            }
+            let mut any = false;
             for x in 0..TILE_W {
                 let [right_px, down_px] = [here[x + 1], below[x]].map(|px| {
                     let (near_px, far_px) = if here[x] < px { (here[x], px) } else { (px, here[x]) };
                     excess_step_px(near_px, far_px, min_step_px)
                 });
-                excess_px[x] = if right_px > down_px { right_px } else { down_px };
+                any |= (right_px >= 0.0) | (down_px >= 0.0);
             }
-            if maximum(&excess_px) >= 0.0 {
+            if any {
                 let mut distances_px = [[NO_SILHOUETTE; TILE_W]; DISTANCES_PER_CELL];
                 for x in 0..TILE_W {
                     let right_px = silhouette_between(here[x], here[x + 1], min_step_px, near_from_px);
@@ -93,19 +96,16 @@ impl MarkSilhouettes<'_> {
                     }
                 }
             }
-            here = below;
         }
     }
 
     #[inline(always)]
     fn mark_mixed_pixels(self, min_step_px: f32) {
-        let (Some(matte), Radii::Field(CocField::Depth(lens), _)) = (self.source.matte, self.source.coc) else {
-            return;
-        };
+        let Radii::Field(CocField::Depth(lens), _) = self.source.coc else { return };
         let width = self.source.size.0;
         let across = width.div_ceil(SILHOUETTE_CELL);
         let (mut last, mut distances_px) = ((0, [f32::NAN; 2]), [NO_SILHOUETTE; DISTANCES_PER_CELL]);
-        for (x, y, pixel) in matte.pixels_in_rows(self.rows.clone(), width) {
+        for (x, y, pixel) in Matte::locate(self.mixed, self.rows.start, width) {
             let line = (y - self.rows.start) / SILHOUETTE_CELL * DISTANCES_PER_CELL;
             let this = (line * across + x / SILHOUETTE_CELL, [pixel.near_m, pixel.far_m]);
             // Neighbours are mostly mixed of the same surfaces.

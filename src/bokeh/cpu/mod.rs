@@ -41,7 +41,7 @@ use gather::Gather;
 use pulp::Arch;
 use rows::Slot;
 use silhouettes::Silhouettes;
-use tiles::{BLOCK, Tiles};
+use tiles::{BLOCK, TILE_W, Tiles};
 use unpack::InputFrame;
 
 use super::ladder::Compositing;
@@ -73,6 +73,7 @@ pub struct CpuBokeh {
 /// Scratch memory of one thread.
 struct ThreadScratch {
     coc: Vec<f32>,
+    lanes: Vec<f32>,
     band: BandScratch,
     dilation: Vec<f32>,
     blur: Scratch,
@@ -89,6 +90,8 @@ impl CpuBokeh {
         let thread_scratch = (0..workers.thread_count())
             .map(|_| ThreadScratch {
                 coc: vec![0.0; width],
+                // Two vectors for each tile.
+                lanes: vec![0.0; width.next_multiple_of(TILE_W)],
                 band: BandScratch::new(),
                 // The pass needs a grid and one row of it.
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),

@@ -16,6 +16,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::encode::CHUNK;
 use crate::bokeh::occlusion::{DISTANCES_PER_CELL, SILHOUETTE_CELL};
+use crate::compute::simd::{load, store};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Distance without a silhouette.
@@ -201,7 +202,7 @@ struct DilateRows<'a> {
 impl WithSimd for DilateRows<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let across = self.marks.len() / self.lines.len();
         let marks = self.marks.chunks_exact(across);
         for (index, ((line, marks), out)) in
@@ -224,44 +225,46 @@ impl WithSimd for DilateRows<'_> {
                 *square = if px > 0.0 { px * px } else { NO_SILHOUETTE };
             }
             out.fill(NO_SILHOUETTE);
-            for_each_group(line.cells.clone(), across, |x, is_whole| match is_whole {
-                true => dilate_cells::<GROUP>(padded, x, reach, &mut out[x..]),
-                false => dilate_cells::<1>(padded, x, reach, &mut out[x..]),
-            });
+            match across < 4 * S::F32_LANES {
+                true => dilate_cells::<_, 1>(pulp::Scalar, padded, line.cells.clone(), reach, out),
+                false => dilate_cells::<_, 4>(simd, padded, line.cells.clone(), reach, out),
+            }
         }
     }
 }
 
-/// Cells computed together.
-const GROUP: usize = 32;
-
-/// Calls `work` with the start of groups that cover some cells of a line, whole ones or single cells if it is short.
+/// Computes the highest radius^2 - distance^2 of the silhouettes around some `cells`, `N` vectors at a time, given
+/// radius^2 in a line `padded` by `reach` cells.
 #[inline(always)]
-fn for_each_group(cells: Range<usize>, across: usize, mut work: impl FnMut(usize, bool)) {
-    let is_whole = across >= GROUP;
-    for x in cells.step_by(if is_whole { GROUP } else { 1 }) {
-        // The last group overlaps the one before.
-        work(if is_whole { x.min(across - GROUP) } else { x }, is_whole);
+fn dilate_cells<S: Simd, const N: usize>(simd: S, padded: &[f32], cells: Range<usize>, reach: usize, out: &mut [f32]) {
+    let none = simd.splat_f32s(NO_SILHOUETTE);
+    for x in groups::<S, N>(cells, out.len()) {
+        let at = |vector: usize, from: usize| load::<S>(padded, from + vector * S::F32_LANES);
+        let mut highest: [S::f32s; N] = std::array::from_fn(|k| at(k, x + reach));
+        for distance in 1..=reach {
+            let distance_square = simd.splat_f32s(distance_square(distance));
+            for (k, highest) in highest.iter_mut().enumerate() {
+                let square = simd.max_f32s(at(k, x + reach - distance), at(k, x + reach + distance));
+                *highest = simd.max_f32s(*highest, simd.sub_f32s(square, distance_square));
+            }
+        }
+        for (k, highest) in highest.into_iter().enumerate() {
+            let is_within = simd.greater_than_f32s(highest, simd.splat_f32s(0.0));
+            store::<S>(out, x + k * S::F32_LANES, simd.select_f32s(is_within, highest, none));
+        }
     }
 }
 
-/// Computes the highest radius^2 - distance^2 of the silhouettes around `N` cells from column `x` on, given radius^2 in
-/// a line `padded` by `reach` cells.
-#[inline(always)]
-fn dilate_cells<const N: usize>(padded: &[f32], x: usize, reach: usize, out: &mut [f32]) {
-    let mut highest = [NO_SILHOUETTE; N];
-    highest.copy_from_slice(&padded[x + reach..][..N]);
-    for distance in 1..=reach {
-        let (before, after) = (&padded[x + reach - distance..][..N], &padded[x + reach + distance..][..N]);
-        let distance_px = (distance * SILHOUETTE_CELL) as f32;
-        for k in 0..N {
-            let square = if before[k] > after[k] { before[k] } else { after[k] } - distance_px * distance_px;
-            highest[k] = if square > highest[k] { square } else { highest[k] };
-        }
-    }
-    for k in 0..N {
-        out[k] = if highest[k] > 0.0 { highest[k] } else { NO_SILHOUETTE };
-    }
+/// Returns the first cells of groups of `N` vectors that cover some cells of a line; the last group ends with the line
+/// at the latest and may overlap the one before.
+fn groups<S: Simd, const N: usize>(cells: Range<usize>, across: usize) -> impl Iterator<Item = usize> {
+    cells.step_by(N * S::F32_LANES).map(move |x| x.min(across - N * S::F32_LANES))
+}
+
+/// Returns the squared distance of cells, in pixels.
+fn distance_square(cells: usize) -> f32 {
+    let distance_px = (cells * SILHOUETTE_CELL) as f32;
+    distance_px * distance_px
 }
 
 /// Dilates lines down the columns, from line `first` on.
@@ -278,7 +281,7 @@ struct DilateColumns<'a> {
 impl WithSimd for DilateColumns<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let (across, down) = (self.row_dilated.len() / self.lines.len(), self.lines.len() / DISTANCES_PER_CELL);
         for (line, out) in (self.first..).zip(self.out.chunks_exact_mut(across)) {
             let (y, plane) = (line / DISTANCES_PER_CELL, line % DISTANCES_PER_CELL);
@@ -287,38 +290,43 @@ impl WithSimd for DilateColumns<'_> {
             }
             // Most lines have no silhouette, or none with a radius that large.
             let near = (y.saturating_sub(self.radius)..(y + self.radius + 1).min(down)).filter_map(|other| {
-                let (from, distance_px) =
-                    (other * DISTANCES_PER_CELL + plane, (other.abs_diff(y) * SILHOUETTE_CELL) as f32);
-                (self.lines[from].top - distance_px * distance_px > NO_SILHOUETTE).then_some((from, distance_px * distance_px))
+                let (from, distance_square) = (other * DISTANCES_PER_CELL + plane, distance_square(other.abs_diff(y)));
+                (self.lines[from].top - distance_square > NO_SILHOUETTE).then_some((from * across, distance_square))
             });
             let (first, end) = near.clone().fold((across, 0), |(first, end), (from, _)| {
-                (first.min(self.lines[from].cells.start), end.max(self.lines[from].cells.end))
+                let cells = &self.lines[from / across].cells;
+                (first.min(cells.start), end.max(cells.end))
             });
             out.fill(NO_SILHOUETTE);
-            for_each_group(first..end, across, |x, is_whole| match is_whole {
-                true => highest_of_lines::<GROUP>(self.row_dilated, across, near.clone(), x, out),
-                false => highest_of_lines::<1>(self.row_dilated, across, near.clone(), x, out),
-            });
+            let rows = self.row_dilated;
+            match across < 4 * S::F32_LANES {
+                true => combine_lines::<_, 1>(pulp::Scalar, rows, near, first..end, out),
+                false => combine_lines::<_, 4>(simd, rows, near, first..end, out),
+            }
         }
     }
 }
 
-/// Computes the highest of some lines, each minus its squared distance, in `N` cells from column `x` on.
+/// Computes the highest of lines that begin at these indices of `rows`, each minus its squared distance, in some
+/// `cells`, `N` vectors at a time.
 #[inline(always)]
-fn highest_of_lines<const N: usize>(
-    row_dilated: &[f32],
-    across: usize,
-    lines: impl Iterator<Item = (usize, f32)>,
-    x: usize,
+fn combine_lines<S: Simd, const N: usize>(
+    simd: S,
+    rows: &[f32],
+    lines: impl Iterator<Item = (usize, f32)> + Clone,
+    cells: Range<usize>,
     out: &mut [f32],
 ) {
-    let mut highest = [NO_SILHOUETTE; N];
-    for (line, distance_square) in lines {
-        let squares = &row_dilated[line * across + x..][..N];
-        for k in 0..N {
-            let left = squares[k] - distance_square;
-            highest[k] = if left > highest[k] { left } else { highest[k] };
+    for x in groups::<S, N>(cells, out.len()) {
+        let mut highest = [simd.splat_f32s(NO_SILHOUETTE); N];
+        for (from, distance_square) in lines.clone() {
+            for (k, highest) in highest.iter_mut().enumerate() {
+                let square = load::<S>(rows, from + x + k * S::F32_LANES);
+                *highest = simd.max_f32s(*highest, simd.sub_f32s(square, simd.splat_f32s(distance_square)));
+            }
+        }
+        for (k, highest) in highest.into_iter().enumerate() {
+            store::<S>(out, x + k * S::F32_LANES, highest);
         }
     }
-    out[x..x + N].copy_from_slice(&highest);
 }

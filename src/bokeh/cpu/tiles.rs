@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use pulp::Simd;
+use pulp::{Simd, WithSimd};
 
 use super::pixels::Radii;
 use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{BinWeight, Plan};
 use crate::bokeh::split::SHARP_PX;
-use crate::frame::Matte;
+use crate::frame::{Matte, MixedPixel};
 use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
@@ -48,6 +48,8 @@ pub struct Tiles {
     /// Per tile, the only bin that it belongs to, as a whole and without mixed pixels, or [`NO_BIN`].
     only: Vec<u8>,
     scratch: Vec<bool>,
+    /// Per row of tiles, the index of its first mixed pixel, and at last their number.
+    first_mixed: Vec<usize>,
     pub across: usize,
     pub down: usize,
 }
@@ -63,6 +65,7 @@ impl Tiles {
             idle: flags.clone(),
             only: vec![NO_BIN; across * down],
             scratch: flags,
+            first_mixed: vec![0; down + 1],
             across,
             down,
         }
@@ -75,6 +78,22 @@ impl Tiles {
         let size = (self.across, self.down);
         erode(&self.idle, &mut self.scratch, &mut self.still, size);
         erode(&self.still, &mut self.scratch, &mut self.idle, size);
+    }
+
+    /// Finds the mixed pixels of each row of tiles. One by one, as memory is read fastest, unlike in a search.
+    pub fn find_mixed(&mut self, matte: Option<&Matte>, (width, height): (usize, usize)) {
+        let pixels = matte.map_or(&[][..], |matte| &matte.pixels);
+        let mut next = 0;
+        for (row, first) in self.first_mixed.iter_mut().enumerate() {
+            let end = (row * TILE_H).min(height) * width;
+            next += pixels[next..].iter().take_while(|pixel| (pixel.at as usize) < end).count();
+            *first = next;
+        }
+    }
+
+    /// Returns the mixed pixels of a row of tiles.
+    pub fn mixed<'a>(&self, matte: Option<&'a Matte>, row: usize) -> &'a [MixedPixel] {
+        matte.map_or(&[], |matte| &matte.pixels[self.first_mixed[row]..self.first_mixed[row + 1]])
     }
 
     /// Sets the range of all tiles, where no layer needs those of each: one radius, or any.
@@ -100,8 +119,10 @@ impl Tiles {
                 }
             }
         }
-        for (x, y, _) in matte.iter().flat_map(|matte| matte.pixels_in_rows(0..plan.height, plan.width)) {
-            self.only[y / TILE_H * self.across + x / TILE_W] = NO_BIN;
+        for (x, y, _) in matte.iter().flat_map(|matte| Matte::locate(&matte.pixels, 0, plan.width)) {
+            if let Some(only) = self.only.get_mut(y / TILE_H * self.across + x / TILE_W) {
+                *only = NO_BIN;
+            }
         }
     }
 
@@ -151,12 +172,16 @@ impl Tiles {
 pub struct ComputeTileRanges<'a> {
     pub source: &'a InputFrame<'a>,
     pub row: usize,
+    /// Mixed pixels in this row.
+    pub mixed: &'a [MixedPixel],
     pub ranges: &'a mut [(f32, f32)],
     /// Scratch for one row of the picture.
     pub coc: &'a mut [f32],
+    /// Scratch for the lowest and the highest value of each tile, in each lane of a vector.
+    pub lanes: &'a mut [f32],
 }
 
-impl pulp::WithSimd for ComputeTileRanges<'_> {
+impl WithSimd for ComputeTileRanges<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -168,31 +193,34 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
             }
             _ => None,
         };
-        self.ranges.fill((f32::INFINITY, f32::NEG_INFINITY));
-        let rows = self.row * TILE_H..((self.row + 1) * TILE_H).min(height);
-        if let Some((_, map)) = direct {
-            for (tile, range) in self.ranges.iter_mut().enumerate() {
-                let x0 = tile * TILE_W;
-                let row = |y: usize| &map.metres[y * width + x0..][..TILE_W.min(width - x0)];
-                // Unknown depth counts as infinite.
-                extend_range(simd, range, rows.clone().map(row), |metres| {
-                    let is_known = simd.greater_than_f32s(metres, simd.splat_f32s(0.0));
-                    simd.select_f32s(is_known, metres, simd.splat_f32s(f32::INFINITY))
+        // Unknown depth counts as infinite.
+        let unknown = simd.splat_f32s(if direct.is_some() { 0.0 } else { f32::NEG_INFINITY });
+        let (lowest, highest) = self.lanes.split_at_mut(self.lanes.len() / 2);
+        let (lowest, highest) = (S::as_mut_simd_f32s(lowest).0, S::as_mut_simd_f32s(highest).0);
+        lowest.fill(simd.splat_f32s(f32::INFINITY));
+        highest.fill(simd.splat_f32s(f32::NEG_INFINITY));
+        // Row by row, as memory is read fastest.
+        for y in self.row * TILE_H..((self.row + 1) * TILE_H).min(height) {
+            let row = match direct {
+                Some((_, map)) => &map.metres[y * width..][..width],
+                None => {
+                    compute_coc_row(self.source, y, 0, self.coc);
+                    &*self.coc
+                }
+            };
+            for ((low, high), tile) in lowest.iter_mut().zip(&mut *highest).zip(row.chunks(TILE_W)) {
+                (*low, *high) = extend_lanes(simd, (*low, *high), tile, |value| {
+                    let is_known = simd.greater_than_f32s(value, unknown);
+                    simd.select_f32s(is_known, value, simd.splat_f32s(f32::INFINITY))
                 });
             }
-        } else {
-            for y in rows.clone() {
-                compute_coc_row(self.source, y, 0, self.coc);
-                for (range, values) in self.ranges.iter_mut().zip(self.coc.chunks(TILE_W)) {
-                    extend_range(simd, range, std::iter::once(values), |coc_px| coc_px);
-                }
-            }
         }
-        if let Some(matte) = self.source.matte {
-            for (x, _, pixel) in matte.pixels_in_rows(rows, width) {
-                let (low, high) = &mut self.ranges[x / TILE_W];
-                (*low, *high) = (low.min(pixel.near_m), high.max(pixel.far_m));
-            }
+        for (range, (low, high)) in self.ranges.iter_mut().zip(lowest.iter().zip(&*highest)) {
+            *range = (simd.reduce_min_f32s(*low), simd.reduce_max_f32s(*high));
+        }
+        for (x, _, pixel) in Matte::locate(self.mixed, self.row * TILE_H, width) {
+            let (low, high) = &mut self.ranges[x / TILE_W];
+            (*low, *high) = (low.min(pixel.near_m), high.max(pixel.far_m));
         }
         if let Some((lens, _)) = direct {
             self.ranges.iter_mut().for_each(|(low, high)| (*low, *high) = (lens.coc_px(*low), lens.coc_px(*high)));
@@ -200,23 +228,26 @@ impl pulp::WithSimd for ComputeTileRanges<'_> {
     }
 }
 
-/// Widens a range by the values of some rows, each mapped by `of`.
+/// Widens a range by some values.
 #[inline(always)]
-pub fn extend_range<'a, S: Simd>(
-    simd: S,
-    range: &mut (f32, f32),
-    rows: impl Iterator<Item = &'a [f32]>,
-    of: impl Fn(S::f32s) -> S::f32s,
-) {
-    // Explicit vectors, because the compiler would shuffle values for the reduction at every step.
-    let (mut low, mut high) = (simd.splat_f32s(range.0), simd.splat_f32s(range.1));
-    for row in rows {
-        let (vectors, rest) = S::as_simd_f32s(row);
-        for value in vectors.iter().copied().chain(rest.iter().map(|&value| simd.splat_f32s(value))) {
-            (low, high) = (simd.min_f32s(low, of(value)), simd.max_f32s(high, of(value)));
-        }
-    }
+pub fn extend_range<S: Simd>(simd: S, range: &mut (f32, f32), values: &[f32]) {
+    let range_lanes = (simd.splat_f32s(range.0), simd.splat_f32s(range.1));
+    let (low, high) = extend_lanes(simd, range_lanes, values, |value| value);
     *range = (simd.reduce_min_f32s(low), simd.reduce_max_f32s(high));
+}
+
+/// Returns the ranges in the lanes of vectors, widened by some values, each mapped by `of`.
+#[inline(always)]
+fn extend_lanes<S: Simd>(
+    simd: S,
+    range: (S::f32s, S::f32s),
+    values: &[f32],
+    of: impl Fn(S::f32s) -> S::f32s,
+) -> (S::f32s, S::f32s) {
+    let extend = |(low, high), value| (simd.min_f32s(low, value), simd.max_f32s(high, value));
+    let (vectors, rest) = S::as_simd_f32s(values);
+    let range = vectors.iter().fold(range, |range, value| extend(range, of(*value)));
+    rest.iter().fold(range, |range, value| extend(range, of(simd.splat_f32s(*value))))
 }
 
 /// Erosion: a tile stays set if its whole neighbourhood is set.
