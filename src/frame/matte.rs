@@ -96,6 +96,7 @@ mod tests {
             [vec![], vec![7], vec![0, 1, 2, 3, 9, 10, 11, 40], (0..50).collect(), (0..50).step_by(7).collect()]
         {
             let matte = Matte { pixels: places.iter().copied().map(pixel).collect() };
+            assert!(Matte::locate(&matte.pixels, 0, 9).all(|(x, y, pixel)| x < 9 && y * 9 + x == pixel.at as usize));
             for (start, end) in (0..52).flat_map(|start| (start..54).map(move |end| (start, end))) {
                 let found: Vec<u32> = matte.pixels_in(start..end).iter().map(|pixel| pixel.at).collect();
                 let expected = places.iter().copied().filter(|&at| (start..end).contains(&(at as usize)));

@@ -63,37 +63,40 @@ impl MarkSilhouettes<'_> {
         let (across, last) = (width.div_ceil(SILHOUETTE_CELL), TILE_W.min(width - x0 - 1));
         let mut below = [0.0; TILE_W + 1];
         compute_coc_row(source, self.rows.start, x0, &mut below[..=last]);
-        for (k, y) in self.rows.clone().enumerate() {
-            let mut here = below;
-            compute_coc_row(source, (y + 1).min(height - 1), x0, &mut below[..=last]);
-            // The outermost pixels repeat.
-            for row in [&mut here, &mut below] {
-                let last_px = row[last];
-                row[last..].fill(last_px);
-            }
-            let mut any = false;
-            for x in 0..TILE_W {
-                let [right_px, down_px] = [here[x + 1], below[x]].map(|px| {
-                    let (near_px, far_px) = if here[x] < px { (here[x], px) } else { (px, here[x]) };
-                    excess_step_px(near_px, far_px, min_step_px)
-                });
-                any |= (right_px >= 0.0) | (down_px >= 0.0);
-            }
-            if any {
-                let mut distances_px = [[NO_SILHOUETTE; TILE_W]; DISTANCES_PER_CELL];
+        let lines = self.marks.chunks_exact_mut(DISTANCES_PER_CELL * across);
+        for (first, line) in self.rows.clone().step_by(SILHOUETTE_CELL).zip(lines) {
+            let mut distances_px = [[NO_SILHOUETTE; TILE_W]; DISTANCES_PER_CELL];
+            for y in first..(first + SILHOUETTE_CELL).min(self.rows.end) {
+                let mut here = below;
+                compute_coc_row(source, (y + 1).min(height - 1), x0, &mut below[..=last]);
+                // The outermost pixels repeat.
+                for row in [&mut here, &mut below] {
+                    let last_px = row[last];
+                    row[last..].fill(last_px);
+                }
+                let mut any = false;
+                for x in 0..TILE_W {
+                    let [right_px, down_px] = [here[x + 1], below[x]].map(|px| {
+                        let (near_px, far_px) = if here[x] < px { (here[x], px) } else { (px, here[x]) };
+                        excess_step_px(near_px, far_px, min_step_px)
+                    });
+                    any |= (right_px >= 0.0) | (down_px >= 0.0);
+                }
+                if !any {
+                    continue;
+                }
                 for x in 0..TILE_W {
                     let right_px = silhouette_between(here[x], here[x + 1], min_step_px, near_from_px);
                     let down_px = silhouette_between(here[x], below[x], min_step_px, near_from_px);
                     for p in 0..DISTANCES_PER_CELL {
-                        distances_px[p][x] = if right_px[p] > down_px[p] { right_px[p] } else { down_px[p] };
+                        distances_px[p][x] = distances_px[p][x].max(right_px[p]).max(down_px[p]);
                     }
                 }
-                let line = k / SILHOUETTE_CELL * DISTANCES_PER_CELL * across;
-                for (plane, distances_px) in self.marks[line..].chunks_exact_mut(across).zip(&distances_px) {
-                    let cells = distances_px.as_chunks::<SILHOUETTE_CELL>().0;
-                    for (mark, distances_px) in plane[x0 / SILHOUETTE_CELL..].iter_mut().zip(cells) {
-                        *mark = distances_px.iter().fold(*mark, |mark, &px| if px > mark { px } else { mark });
-                    }
+            }
+            for (plane, distances_px) in line.chunks_exact_mut(across).zip(&distances_px) {
+                let cells = distances_px.as_chunks::<SILHOUETTE_CELL>().0;
+                for (mark, &[a, b, c, d]) in plane[x0 / SILHOUETTE_CELL..].iter_mut().zip(cells) {
+                    *mark = a.max(b).max(c.max(d));
                 }
             }
         }

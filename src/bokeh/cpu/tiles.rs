@@ -253,8 +253,10 @@ fn extend_lanes<S: Simd>(
 /// Erosion: a tile stays set if its whole neighbourhood is set.
 fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (usize, usize)) {
     for (row, out) in from.chunks_exact(across).zip(scratch.chunks_exact_mut(across)) {
-        for (x, out) in out.iter_mut().enumerate() {
-            *out = row[x.saturating_sub(NEIGHBOURHOOD.0)..(x + NEIGHBOURHOOD.0 + 1).min(across)].iter().all(|&set| set);
+        out.copy_from_slice(row);
+        for distance in 1..(NEIGHBOURHOOD.0 + 1).min(across) {
+            out.iter_mut().zip(&row[distance..]).for_each(|(out, set)| *out &= set);
+            out[distance..].iter_mut().zip(row).for_each(|(out, set)| *out &= set);
         }
     }
     for (y, out) in to.chunks_exact_mut(across).enumerate() {
