@@ -25,20 +25,21 @@ impl CpuBokeh {
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
             let near_from_px = self.plan.near_from_px();
-            let (tiles, arch) = (&mut self.tiles, self.arch);
-            let down = tiles.down;
-            tiles.find_mixed(frame.matte, frame.size);
-            let mut all = std::mem::take(&mut tiles.ranges);
-            let ranges = DisjointParts::new(&mut all, across, &mut self.taken);
+            let (down, arch) = (self.tiles.down, self.arch);
+            self.tiles.find_mixed(frame.matte, frame.size);
+            let first_mixed = &self.tiles.first_mixed;
+            let mixed =
+                |row: usize| frame.matte.map_or(&[][..], |matte| &matte.pixels[first_mixed[row]..first_mixed[row + 1]]);
+            let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
             self.workers.run_with(&mut self.thread_scratch, down, &|thread: &mut ThreadScratch, row| {
-                let (mixed, ranges) = (tiles.mixed(frame.matte, row), ranges.part(row));
+                let (mixed, ranges) = (mixed(row), ranges.part(row));
                 let (coc, lanes) = (&mut thread.coc, &mut thread.lanes);
                 arch.dispatch(ComputeTileRanges { source: frame, row, mixed, ranges, coc, lanes });
             });
             // Part 0 computes the split; the other parts each survey a row of tiles.
             let mut alone = [AtomicBool::new(false)];
             let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
-            let marks = self.silhouettes.marks(TILE_H);
+            let (all, marks) = (&self.tiles.ranges, self.silhouettes.marks(TILE_H));
             self.workers.run(down + 1, &|part| {
                 let Some(row) = part.checked_sub(1) else {
                     return frame.coc.split(&mut plan.part(0)[0]);
@@ -46,10 +47,9 @@ impl CpuBokeh {
                 let ranges = |row: usize| &all[row.min(down - 1) * across..][..across];
                 let (ranges, rows) =
                     ([ranges(row), ranges(row + 1)], row * TILE_H..((row + 1) * TILE_H).min(frame.size.1));
-                let (mixed, marks) = (tiles.mixed(frame.matte, row), marks.part(row));
+                let (mixed, marks) = (mixed(row), marks.part(row));
                 arch.dispatch(MarkSilhouettes { source: frame, ranges, rows, mixed, marks, near_from_px });
             });
-            tiles.ranges = all;
             // With nothing in front, no background is inpainted.
             let planes =
                 if self.plan.bins.iter().any(|bin| bin.near) { DISTANCES_PER_CELL } else { DISTANCES_PER_CELL - 1 };

@@ -49,7 +49,7 @@ pub struct Tiles {
     only: Vec<u8>,
     scratch: Vec<bool>,
     /// Per row of tiles, the index of its first mixed pixel, and at last their number.
-    first_mixed: Vec<usize>,
+    pub first_mixed: Vec<usize>,
     pub across: usize,
     pub down: usize,
 }
@@ -89,11 +89,6 @@ impl Tiles {
             next += pixels[next..].iter().take_while(|pixel| (pixel.at as usize) < end).count();
             *first = next;
         }
-    }
-
-    /// Returns the mixed pixels of a row of tiles.
-    pub fn mixed<'a>(&self, matte: Option<&'a Matte>, row: usize) -> &'a [MixedPixel] {
-        matte.map_or(&[], |matte| &matte.pixels[self.first_mixed[row]..self.first_mixed[row + 1]])
     }
 
     /// Sets the range of all tiles, where no layer needs those of each: one radius, or any.
