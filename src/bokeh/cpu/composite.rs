@@ -13,16 +13,15 @@ use super::enlarge::{CodeRows, Enlarge};
 use super::layers::Layers;
 use super::pixels::Sample;
 use super::rows::{STRIP_ROW, Slot};
-use super::sample::sample_bin;
+use super::sample::{read_in_focus, sample_bin};
 use super::silhouettes::Silhouettes;
-use super::tent::{VectorWeight, is_zero};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{InputFrame, Surfaces, compression_factor, compute_coc_row};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{Bin, BinWeight, CELL, MAX_BINS, Plan};
+use crate::bokeh::plan::{Bin, CELL, Plan};
 use crate::color::luminance;
 use crate::compute::aligned::CacheAligned;
-use crate::compute::simd::{madd, prefetch, store};
+use crate::compute::simd::{madd, prefetch};
 
 /// Computes rows `y0..` of the result: a row of tiles.
 pub struct Composite<'a, T> {
@@ -51,80 +50,109 @@ pub struct CompositeScratch {
     layers: Layers,
     in_focus: Surfaces<CHUNK>,
     codes: CodeRows,
+    /// What each tile of the row shows.
+    contents: Vec<Content>,
 }
 
 impl CompositeScratch {
     pub fn new() -> Self {
-        Self { layers: Layers::new(), in_focus: Surfaces::new(), codes: CodeRows::new() }
+        Self { layers: Layers::new(), in_focus: Surfaces::new(), codes: CodeRows::new(), contents: Vec::new() }
     }
 }
 
-/// What adjacent tiles of a chunk show.
+/// What adjacent tiles show.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Content {
     /// The picture as it is.
     Still,
     /// One bin at a reduced scale, alone.
     One(usize),
-    /// Several bins, or parts of one.
-    Mixed,
+    /// Several bins, or parts of one. What is in focus may hide parts of one bin at a reduced scale.
+    Mixed(Option<usize>),
+}
+
+impl Content {
+    /// Returns the bin that is to be enlarged.
+    fn enlarged(self) -> Option<usize> {
+        match self {
+            Self::One(bin) => Some(bin),
+            Self::Mixed(bin) => bin,
+            Self::Still => None,
+        }
+    }
 }
 
 impl<T: Sample> WithSimd for Composite<'_, T> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let width = self.plan.width;
         let out = std::mem::take(&mut self.out);
         self.scratch.layers.set_near_border(self.plan.near_border());
-        for x0 in (0..width).step_by(CHUNK) {
-            let mut spread = [false; MAX_BINS];
-            for (spread, bin) in spread.iter_mut().zip(&self.plan.bins) {
-                *spread = self.has_content(bin, x0);
-            }
-            let tiles = x0 / TILE_W..(x0 + CHUNK).min(width).div_ceil(TILE_W);
-            let mut first = tiles.start;
-            while first < tiles.end {
-                let content = self.content_of(first, &spread);
-                let next = (first + 1..tiles.end).find(|&tile| self.content_of(tile, &spread) != content);
-                let next = next.unwrap_or(tiles.end);
-                let columns = first * TILE_W - x0..(next * TILE_W).min(width) - x0;
-                self.show(simd, content, x0, columns, out);
-                first = next;
+        let mut contents = std::mem::take(&mut self.scratch.contents);
+        contents.clear();
+        contents.extend((0..self.tiles.across).map(|tile| self.content_of(tile)));
+        let width = self.plan.width;
+        let columns_of = |tiles: &Range<usize>| tiles.start * TILE_W..(tiles.end * TILE_W).min(width);
+        for run in runs(&contents, |content| content.enlarged(), usize::MAX) {
+            if let Some(bin) = contents[run.start].enlarged() {
+                self.enlarge(simd, &self.plan.bins[bin], columns_of(&run), out);
             }
         }
+        for run in runs(&contents, |content| content, CHUNK / TILE_W) {
+            self.show(simd, contents[run.start], columns_of(&run), out);
+        }
+        self.scratch.contents = contents;
     }
 }
 
+/// Returns runs of tiles, at most `longest`, that are alike in a property.
+fn runs<P: PartialEq>(
+    contents: &[Content],
+    property: impl Fn(Content) -> P,
+    longest: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let mut end = 0;
+    std::iter::from_fn(move || {
+        let first = end;
+        let start = property(*contents.get(first)?);
+        end += contents[first..].iter().take(longest).take_while(|&&content| property(content) == start).count();
+        Some(first..end)
+    })
+}
+
 impl<T: Sample> Composite<'_, T> {
-    /// Returns what a tile shows, given which bins have content around.
+    /// Returns what a tile shows.
     #[inline(always)]
-    fn content_of(&self, tile: usize, spread: &[bool; MAX_BINS]) -> Content {
+    fn content_of(&self, tile: usize) -> Content {
         let (bins, at) = (&self.plan.bins, self.y0 / TILE_H * self.tiles.across + tile);
+        let (only, sharp) = (self.tiles.only_bin_of(at), self.plan.sharp_bin());
         // In focus, and nothing near spreads here: the input is the result.
         if self.plan.compositing == Compositing::Layers
-            && self.tiles.still[at]
-            && !bins.iter().zip(spread).any(|(bin, &spread)| bin.near && spread)
+            && (self.tiles.still[at] || only.is_some() && only == sharp)
+            && !bins.iter().any(|bin| bin.near && self.has_content(bin, tile))
         {
             return Content::Still;
         }
-        match self.tiles.only_bin_of(at) {
-            Some(only)
-                if T::as_codes(&mut []).is_some() && bins[only].scale > 1 && self.slots[bins[only].slot].present =>
-            {
-                let is_alone = spread.iter().enumerate().all(|(k, &spread)| k == only || !spread);
-                if is_alone { Content::One(only) } else { Content::Mixed }
-            }
-            _ => Content::Mixed,
+        let only = only.filter(|&only| self.slots[bins[only].slot].present);
+        let behind = || bins.iter().position(|bin| self.has_content(bin, tile)).filter(|_| sharp.is_some());
+        let blurred = only.or_else(behind).filter(|&blurred| {
+            let mut others = bins.iter().enumerate().filter(|&(k, _)| k != blurred);
+            bins[blurred].scale > 1
+                && T::as_codes(&mut []).is_some()
+                && !others.any(|(_, bin)| self.has_content(bin, tile))
+        });
+        match blurred {
+            Some(blurred) if only == Some(blurred) => Content::One(blurred),
+            _ => Content::Mixed(blurred),
         }
     }
 
-    /// Whether a blurred bin has content in a chunk of this row of tiles.
+    /// Whether a blurred bin has content in a tile.
     #[inline(always)]
-    fn has_content(&self, bin: &Bin, x0: usize) -> bool {
-        let slot = &self.slots[bin.slot];
+    fn has_content(&self, bin: &Bin, tile: usize) -> bool {
+        let (slot, x0) = (&self.slots[bin.slot], tile * TILE_W);
         let rows = (self.y0 / bin.scale).saturating_sub(1)..((self.y0 + TILE_H) / bin.scale + 1).min(bin.height);
-        let strips = slot.strips((x0 / bin.scale).saturating_sub(1)..(x0 + CHUNK) / bin.scale + 1);
+        let strips = slot.strips((x0 / bin.scale).saturating_sub(1)..(x0 + TILE_W) / bin.scale + 1);
         slot.present
             && strips.into_iter().any(|strip| {
                 let first = rows.start - rows.start % CELL;
@@ -132,112 +160,134 @@ impl<T: Sample> Composite<'_, T> {
             })
     }
 
-    /// Writes some `columns` of the chunk at column `x0` to the rows `out`.
+    /// Writes some `columns` of a bin at a reduced scale to the rows `out`.
     #[inline(always)]
-    fn show<S: Simd>(&mut self, simd: S, content: Content, x0: usize, columns: Range<usize>, out: &mut [T]) {
-        let width = self.plan.width;
-        match content {
-            Content::Still => {
-                let pixels = &self.pixels[self.y0 * width * 3..];
-                let columns = (x0 + columns.start) * 3..(x0 + columns.end) * 3;
-                for (from, into) in pixels.chunks_exact(width * 3).zip(out.chunks_exact_mut(width * 3)) {
-                    into[columns.clone()].copy_from_slice(&from[columns.clone()]);
-                }
-            }
-            Content::One(only) => {
-                let (bin, expansion) = (&self.plan.bins[only], self.frame.expansion);
-                let Some(codes) = T::as_codes(out) else { return };
-                Enlarge { bin, slot: &self.slots[bin.slot], y0: self.y0, x0, columns, width, expansion }.show(
-                    simd,
-                    codes,
-                    &mut self.scratch.codes,
-                );
-            }
-            Content::Mixed => self.composite(simd, x0, columns, out),
+    fn enlarge<S: Simd>(&mut self, simd: S, bin: &Bin, columns: Range<usize>, out: &mut [T]) {
+        self.prefetch(bin, columns.clone());
+        let (slot, width, expansion) = (&self.slots[bin.slot], self.plan.width, self.frame.expansion);
+        if let Some(codes) = T::as_codes(out) {
+            Enlarge { bin, slot, y0: self.y0, columns, width, expansion }.show(simd, codes, &mut self.scratch.codes);
         }
     }
 
-    /// Composites the bins of some columns of a chunk.
+    /// Writes some `columns`, where no bin is alone, to the rows `out`.
     #[inline(always)]
-    fn composite<S: Simd>(&mut self, simd: S, x0: usize, columns: Range<usize>, out: &mut [T]) {
+    fn show<S: Simd>(&mut self, simd: S, content: Content, columns: Range<usize>, out: &mut [T]) {
         let width = self.plan.width;
-        let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
-        let tiles = (x0 + columns.start) / TILE_W..(x0 + columns.end).div_ceil(TILE_W);
-        let ranges = &self.tiles.ranges[row_of_tiles + tiles.start..row_of_tiles + tiles.end];
+        if matches!(content, Content::Mixed(_)) {
+            self.plan.bins.iter().for_each(|bin| self.prefetch(bin, columns.clone()));
+        }
         let rows = self.y0..self.y0 + (out.len() / (width * 3)).max(1);
-        let may_be_near = self.plan.compositing == Compositing::Layers
-            && self.silhouettes.may_be_near(x0 + columns.start..x0 + columns.end, rows.clone());
-        if x0 + CHUNK < width {
-            self.prefetch(x0 + CHUNK, rows.len());
-        }
-        let (mut color, mut coc_px) = (CacheAligned([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
-        // Whole vectors, also beyond the picture.
-        let vectors = columns.start..columns.end.next_multiple_of(TILE_W);
+        let may_be_near =
+            self.plan.compositing == Compositing::Layers && self.silhouettes.may_be_near(columns.clone(), rows.clone());
         for (y, row) in rows.zip(out.chunks_exact_mut(width * 3)) {
-            match self.plan.compositing {
-                Compositing::Layers => {
-                    self.read_layers(simd, y, x0, vectors.clone());
-                    // Several surfaces are visible only near silhouettes; elsewhere a cheaper compositing suffices.
-                    let proximity = if may_be_near { self.silhouettes.proximity(y, x0) } else { None };
-                    let is_one_surface = proximity.is_none() && self.scratch.layers.have_one_surface(ranges);
-                    if !is_one_surface {
-                        compute_coc_row(self.frame, y, x0 + columns.start, &mut coc_px[columns.clone()]);
-                    }
-                    self.scratch.layers.composite(
-                        simd,
-                        vectors.clone(),
-                        &proximity,
-                        &coc_px,
-                        is_one_surface,
-                        &mut color,
-                    );
-                }
-                Compositing::Select => self.select_by_coc(simd, y, x0, columns.clone(), &mut color.0),
-                Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
-            }
-            compress_highlights(&mut color.0, columns.clone(), self.frame.expansion);
-            let color = [&color.0[0][columns.clone()], &color.0[1][columns.clone()], &color.0[2][columns.clone()]];
-            T::write(color, self.encoder, &mut row[(x0 + columns.start) * 3..(x0 + columns.end) * 3]);
-        }
-    }
-
-    /// Prefetches the bins of a chunk of `rows` rows.
-    #[inline(always)]
-    fn prefetch(&self, x0: usize, rows: usize) {
-        for bin in &self.plan.bins {
-            let slot = &self.slots[bin.slot];
-            if !slot.present {
-                continue;
-            }
-            let first = (self.y0 / bin.scale).min(bin.height - 1);
-            let end = ((self.y0 + rows - 1) / bin.scale + 2).min(bin.height);
-            for strip in slot.strips(x0 / bin.scale..(x0 + CHUNK) / bin.scale) {
-                if slot.is_active(strip, first, bin.height) {
-                    prefetch(
-                        &slot.out[(strip * bin.height + first) * STRIP_ROW..(strip * bin.height + end) * STRIP_ROW],
-                    );
+            match content {
+                Content::Still => self.copy_source(y, columns.clone(), row),
+                Content::One(_) => {}
+                Content::Mixed(blurred) => {
+                    self.composite_row(simd, y, columns.clone(), blurred.is_some(), may_be_near, row)
                 }
             }
         }
     }
 
-    /// Reads the bins with content in some `columns` of a chunk.
+    /// Copies some `columns` of a row of the picture.
     #[inline(always)]
-    fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, columns: Range<usize>) {
+    fn copy_source(&self, y: usize, columns: Range<usize>, row: &mut [T]) {
+        let values = columns.start * 3..columns.end * 3;
+        row[values.clone()].copy_from_slice(&self.pixels[y * self.plan.width * 3..][values]);
+    }
+
+    /// Composites the bins of a row at some columns of the picture, a chunk at most. What is behind may be `shown`
+    /// already.
+    #[inline(always)]
+    fn composite_row<S: Simd>(
+        &mut self,
+        simd: S,
+        y: usize,
+        columns: Range<usize>,
+        is_shown: bool,
+        may_be_near: bool,
+        row: &mut [T],
+    ) {
+        let (x0, count) = (columns.start, columns.len());
+        self.scratch.layers.clear();
+        let Some(sharp) = self.plan.sharp_bin() else {
+            return self.composite_columns(simd, (x0, y), 0..count, may_be_near, row);
+        };
+        // Whole vectors, also beyond the picture.
         let CompositeScratch { layers, in_focus, .. } = &mut *self.scratch;
-        let plan = self.plan;
-        layers.clear();
-        let sharp = plan.sharp_bin();
-        for (k, bin) in plan.bins.iter().enumerate() {
-            let buffer = layers.next_buffer();
-            let has_content = match Some(k) == sharp {
-                true => {
-                    read_in_focus(simd, self.frame, &plan.bin_weight(k), (x0, y), columns.clone(), in_focus, buffer)
+        let (weight, vectors) = (self.plan.bin_weight(sharp), count.next_multiple_of(TILE_W));
+        read_in_focus(simd, self.frame, &weight, (x0, y), vectors, in_focus, layers.next_buffer());
+        let mut start = 0;
+        while start < count {
+            let covers = self.scratch.layers.next_covers(simd, start);
+            let mut end = start + S::F32_LANES;
+            while end < count && self.scratch.layers.next_covers(simd, end) == covers {
+                end += S::F32_LANES;
+            }
+            let columns = start..end.min(count);
+            match covers {
+                Some(true) => self.copy_source(y, x0 + columns.start..x0 + columns.end, row),
+                Some(false) if is_shown => {}
+                _ => {
+                    self.scratch.layers.push(&self.plan.bins[sharp]);
+                    self.composite_columns(simd, (x0, y), columns, may_be_near, row);
+                    self.scratch.layers.clear();
                 }
-                false => sample_bin(simd, bin, &self.slots[bin.slot], y, x0, buffer),
-            };
-            if has_content {
-                layers.push(bin);
+            }
+            start = end;
+        }
+    }
+
+    /// Composites some `columns` of the chunk at column `x0` of row `y`, behind what is in focus.
+    #[inline(always)]
+    fn composite_columns<S: Simd>(
+        &mut self,
+        simd: S,
+        (x0, y): (usize, usize),
+        columns: Range<usize>,
+        may_be_near: bool,
+        row: &mut [T],
+    ) {
+        let (plan, mut color, mut coc_px) = (self.plan, CacheAligned([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
+        let of_picture = x0 + columns.start..x0 + columns.end;
+        match plan.compositing {
+            Compositing::Layers => {
+                let layers = &mut self.scratch.layers;
+                for bin in &plan.bins {
+                    let slot = &self.slots[bin.slot];
+                    if sample_bin(simd, bin, slot, (x0, y), columns.clone(), layers.next_buffer()) {
+                        layers.push(bin);
+                    }
+                }
+                // Several surfaces are visible only near silhouettes; elsewhere a cheaper compositing suffices.
+                let proximity = if may_be_near { self.silhouettes.proximity(y, x0) } else { None };
+                let tiles = self.y0 / TILE_H * self.tiles.across;
+                let tiles = tiles + of_picture.start / TILE_W..tiles + of_picture.end.div_ceil(TILE_W);
+                let is_one_surface = proximity.is_none() && layers.have_one_surface(&self.tiles.ranges[tiles]);
+                if !is_one_surface {
+                    compute_coc_row(self.frame, y, of_picture.start, &mut coc_px[columns.clone()]);
+                }
+                let vectors = columns.start..columns.end.next_multiple_of(S::F32_LANES);
+                layers.composite(simd, vectors, &proximity, &coc_px, is_one_surface, &mut color);
+            }
+            Compositing::Select => self.select_by_coc(simd, (x0, y), columns.clone(), &mut color.0),
+            Compositing::Gather => copy_gathered(self.gathered, plan.width, y, x0, &mut color.0),
+        }
+        compress_highlights(&mut color.0, columns.clone(), self.frame.expansion);
+        T::write::<S>(&color.0, columns, self.encoder, &mut row[of_picture.start * 3..of_picture.end * 3]);
+    }
+
+    /// Prefetches what some `columns` show of a bin.
+    #[inline(always)]
+    fn prefetch(&self, bin: &Bin, columns: Range<usize>) {
+        let slot = &self.slots[bin.slot];
+        let rows = (self.y0 / bin.scale).saturating_sub(1)..((self.y0 + TILE_H) / bin.scale + 1).min(bin.height);
+        for strip in slot.strips(columns.start / bin.scale..columns.end / bin.scale).filter(|_| slot.present) {
+            if slot.is_active(strip, rows.start, bin.height) {
+                let first = strip * bin.height;
+                prefetch(&slot.out[(first + rows.start) * STRIP_ROW..(first + rows.end) * STRIP_ROW]);
             }
         }
     }
@@ -247,18 +297,15 @@ impl<T: Sample> Composite<'_, T> {
     fn select_by_coc<S: Simd>(
         &mut self,
         simd: S,
-        y: usize,
-        x0: usize,
+        (x0, y): (usize, usize),
         columns: Range<usize>,
         color: &mut [[f32; CHUNK]; 3],
     ) {
-        self.scratch.layers.clear();
         let layer = self.scratch.layers.next_buffer();
         let mut coc = [0.0; CHUNK];
         compute_coc_row(self.frame, y, x0 + columns.start, &mut coc[columns.clone()]);
-        *color = [[0.0; CHUNK]; 3];
         for (k, bin) in self.plan.bins.iter().enumerate() {
-            if !sample_bin(simd, bin, &self.slots[bin.slot], y, x0, layer) {
+            if !sample_bin(simd, bin, &self.slots[bin.slot], (x0, y), columns.clone(), layer) {
                 continue;
             }
             let bin_weight = self.plan.bin_weight(k);
@@ -270,31 +317,6 @@ impl<T: Sample> Composite<'_, T> {
             }
         }
     }
-}
-
-/// Reads what is in focus in some `columns` of a chunk from the picture, as a layer. Returns false if there is nothing.
-#[inline(always)]
-fn read_in_focus<S: Simd>(
-    simd: S,
-    frame: &InputFrame<'_>,
-    weight: &BinWeight,
-    (x0, y): (usize, usize),
-    columns: Range<usize>,
-    surfaces: &mut Surfaces<CHUNK>,
-    out: &mut [[f32; CHUNK]; 4],
-) -> bool {
-    frame.unpack::<S, CHUNK>(y, (x0 + columns.start) as isize, columns.len(), surfaces);
-    let weight = VectorWeight::new(simd, &Some(*weight));
-    let mut some = false;
-    for x in (0..columns.len()).step_by(S::F32_LANES) {
-        let taken = weight.surface_weights(simd, surfaces, x);
-        some |= !is_zero(simd, taken);
-        let values = weight.apply(simd, taken, surfaces, x);
-        for p in 0..4 {
-            store::<S>(&mut out[p], columns.start + x, values[p]);
-        }
-    }
-    some
 }
 
 /// Copies a chunk of the gather's result.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use pulp::Arch;
 
-use super::encode::{EncodeTable, Encoder};
+use super::encode::Encoder;
 use super::{BandedBokeh, CpuBokeh, Radii};
 use crate::bokeh::{BlurredFrame, Bokeh, BokehError, Job, PassTimes, Picture};
 use crate::color::Picture16;
@@ -44,7 +44,7 @@ impl BandedBokeh {
         coc: &CocField,
     ) -> Result<Picture16, BokehError> {
         self.plan.check_frame(picture.size(), depth, coc)?;
-        self.encoder = Some(Arc::new(Encoder { table: EncodeTable::new(), curves: Some(picture.curves.clone()) }));
+        self.encoder = Some(Arc::new(Encoder { curves: Some(picture.curves.clone()) }));
         let mut out = Picture16::new(picture.size(), picture.curves.clone());
         time_passes(|lap| self.blur_pixels(&picture.rgb, Radii::Field(coc, depth), &mut out.rgb, lap));
         Ok(out)

@@ -201,6 +201,17 @@ impl Layers {
         self.near += usize::from(bin.near);
     }
 
+    /// Whether the next layer covers all of a vector of pixels, or none of it; `None` if neither.
+    #[inline(always)]
+    pub fn next_covers<S: Simd>(&self, simd: S, x: usize) -> Option<bool> {
+        let coverage = load::<S>(&self.planes[self.count].0[3], x);
+        let first = |mask| simd.first_true_m32s(mask) == S::F32_LANES;
+        match first(simd.less_than_f32s(coverage, simd.splat_f32s(1.0 - 1e-5))) {
+            true => Some(true),
+            false => first(simd.greater_than_f32s(coverage, simd.splat_f32s(0.0))).then_some(false),
+        }
+    }
+
     /// Whether every layer fully counts as the surface of each pixel whose CoC is in one of these ranges.
     #[inline(always)]
     pub fn have_one_surface(&self, ranges_px: &[(f32, f32)]) -> bool {

@@ -36,7 +36,7 @@ use std::sync::atomic::AtomicBool;
 
 use band::{BandScratch, NO_BIN};
 use blur::Scratch;
-use encode::{EncodeTable, Encoder};
+use encode::Encoder;
 use gather::Gather;
 use pulp::Arch;
 use rows::Slot;
@@ -102,7 +102,7 @@ impl CpuBokeh {
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
-            encoder: Arc::new(Encoder { table: EncodeTable::new(), curves: None }),
+            encoder: Arc::new(Encoder { curves: None }),
             tiles: Tiles::new(width, height),
             silhouettes: Silhouettes::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),

@@ -1,8 +1,14 @@
 //! Sample types of pictures in memory, and their circles of confusion.
 
-use super::encode::Encoder;
+use std::ops::Range;
+
+use pulp::Simd;
+
+use super::encode::{CHUNK, Encoder, code_of, interleave};
+use super::tiles::TILE_W;
 use crate::bokeh::plan::Plan;
 use crate::color::ToneCurves;
+use crate::compute::simd::round_to_integer;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -57,8 +63,8 @@ pub trait Sample: Default + Copy + Send + Sync {
     /// Returns samples as 8-bit sRGB codes, if they are.
     fn as_codes(samples: &mut [Self]) -> Option<&mut [u8]>;
 
-    /// Writes a chunk of linear light as samples; `out` may be shorter.
-    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [Self]);
+    /// Writes linear light of some `columns` of a chunk as samples.
+    fn write<S: Simd>(color: &[[f32; CHUNK]; 3], columns: Range<usize>, encoder: &Encoder, out: &mut [Self]);
 }
 
 impl Sample for u8 {
@@ -71,8 +77,17 @@ impl Sample for u8 {
     }
 
     #[inline(always)]
-    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [u8]) {
-        encoder.table.encode(color, out);
+    fn write<S: Simd>(color: &[[f32; CHUNK]; 3], columns: Range<usize>, _: &Encoder, out: &mut [u8]) {
+        let mut codes = [[0; CHUNK]; 3];
+        // Whole tiles, because arrays of fixed size vectorise.
+        for first in (columns.start - columns.start % TILE_W..columns.end).step_by(TILE_W) {
+            for (codes, color) in codes.iter_mut().zip(color) {
+                for (code, &light) in codes[first..first + TILE_W].iter_mut().zip(&color[first..first + TILE_W]) {
+                    *code = round_to_integer(code_of::<S>(light)) as u8;
+                }
+            }
+        }
+        interleave(codes.each_ref().map(|plane| &plane[columns.clone()]), out);
     }
 }
 
@@ -86,9 +101,9 @@ impl Sample for u16 {
     }
 
     #[inline(always)]
-    fn write(color: [&[f32]; 3], encoder: &Encoder, out: &mut [u16]) {
+    fn write<S: Simd>(color: &[[f32; CHUNK]; 3], columns: Range<usize>, encoder: &Encoder, out: &mut [u16]) {
         let curves = encoder.curves();
-        for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        for (x, pixel) in columns.zip(out.as_chunks_mut::<3>().0) {
             *pixel = std::array::from_fn(|channel| curves.0[channel].encode(color[channel][x]));
         }
     }
@@ -104,9 +119,9 @@ impl Sample for f32 {
     }
 
     #[inline(always)]
-    fn write(color: [&[f32]; 3], _: &Encoder, out: &mut [f32]) {
+    fn write<S: Simd>(color: &[[f32; CHUNK]; 3], columns: Range<usize>, _: &Encoder, out: &mut [f32]) {
         // Next to very bright light, filters of few terms may sum to less than 0.
-        for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        for (x, pixel) in columns.zip(out.as_chunks_mut::<3>().0) {
             *pixel =
                 [Pixels::clamp_light(color[0][x]), Pixels::clamp_light(color[1][x]), Pixels::clamp_light(color[2][x])];
         }
