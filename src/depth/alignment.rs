@@ -1,6 +1,9 @@
 //! Photometric and geometric alignment of an earlier picture of the same background, such as a plate, with the current
 //! one: a gain per channel for exposure and white balance, and a shift for small movements of the camera.
 
+use std::iter::StepBy;
+use std::ops::Range;
+
 use super::reduced;
 use super::tap::Tap;
 
@@ -85,21 +88,21 @@ impl Aligner {
         }
     }
 
-    /// Moves `alignment` a step towards that of `now`, from the pixels that are not `is_foreground`.
+    /// Moves `alignment` a step towards that of `now`, from the pixels of some rows that are not `is_foreground`.
     pub fn update(
         &mut self,
         now: &[[f32; 3]],
         is_foreground: &[bool],
-        size: (usize, usize),
+        (width, rows): (usize, StepBy<Range<usize>>),
         alignment: &mut Alignment,
     ) {
         for p in 0..3 {
-            if let Some(gain) = self.estimate_gain(now, is_foreground, p) {
+            if let Some(gain) = self.estimate_gain(now, is_foreground, (width, rows.clone()), p) {
                 let correction = gain / alignment.gain[p] - 1.0;
                 alignment.gain[p] *= 1.0 + if correction.abs() > MAX_EASED { correction } else { RATE * correction };
             }
         }
-        let step = self.estimate_shift(now, is_foreground, size, alignment.gain);
+        let step = self.estimate_shift(now, is_foreground, (width, rows), alignment.gain);
         if let Some([across, down]) = step.filter(|[across, down]| across.hypot(*down) >= MIN_STEP) {
             alignment.shift[0] += across.clamp(-MAX_STEP, MAX_STEP);
             alignment.shift[1] += down.clamp(-MAX_STEP, MAX_STEP);
@@ -108,19 +111,26 @@ impl Aligner {
 
     /// Returns the median of now / plate in channel `p`, which a minority of foreground does not change; `None` if too
     /// little background is visible.
-    fn estimate_gain(&mut self, now: &[[f32; 3]], is_foreground: &[bool], p: usize) -> Option<f32> {
+    fn estimate_gain(
+        &mut self,
+        now: &[[f32; 3]],
+        is_foreground: &[bool],
+        (width, rows): (usize, StepBy<Range<usize>>),
+        p: usize,
+    ) -> Option<f32> {
         self.histogram.clear();
         self.histogram.resize(BINS, 0);
-        let mut count = 0;
-        let all = now.iter().zip(&self.shifted).zip(is_foreground).step_by(SAMPLING_STEP);
-        for ((now, plate), _) in all.filter(|(_, is_foreground)| !**is_foreground) {
+        let (mut count, pixels) = (0, rows.len() * width);
+        let all = rows.flat_map(|row| (row * width..(row + 1) * width).step_by(SAMPLING_STEP));
+        for at in all.filter(|&at| !is_foreground[at]) {
+            let (now, plate) = (&now[at], &self.shifted[at]);
             if now[p].min(plate[p]) > MIN_VALUE && now[p].max(plate[p]) < MAX_VALUE {
                 let bin = (now[p] / plate[p]).log2() * PER_OCTAVE + BINS as f32 / 2.0;
                 self.histogram[(bin as usize).min(BINS - 1)] += 1;
                 count += 1;
             }
         }
-        if count < is_foreground.len() / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
+        if count < pixels / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
             return None;
         }
         let mut below = 0;
@@ -139,11 +149,12 @@ impl Aligner {
         &self,
         now: &[[f32; 3]],
         is_foreground: &[bool],
-        (width, height): (usize, usize),
+        (width, rows): (usize, StepBy<Range<usize>>),
         gain: [f32; 3],
     ) -> Option<[f32; 2]> {
         let (mut sums, mut count) = ([0.0f32; 5], 0);
-        for y in 1..height.max(1) - 1 {
+        let (height, pixels) = (self.shifted.len() / width.max(1), rows.len() * width);
+        for y in rows.filter(|&y| y > 0 && y + 1 < height) {
             for x in 1..width.max(1) - 1 {
                 let at = y * width + x;
                 let value = |at: usize| gain[1] * self.shifted[at][1];
@@ -162,7 +173,7 @@ impl Aligner {
         let [xx, xy, yy, x, y] = sums;
         let determinant = xx * yy - xy * xy;
         let least = MIN_TEXTURE * count as f32;
-        (count > width * height / MIN_BACKGROUND_DIVISOR && determinant > least * least)
+        (count > pixels / MIN_BACKGROUND_DIVISOR && determinant > least * least)
             .then(|| [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant])
     }
 }
@@ -189,7 +200,7 @@ mod tests {
         let is_foreground = vec![false; now.len()];
         for _ in 0..12 {
             aligner.shift_plate(&plate, SIZE, alignment.shift);
-            aligner.update(&now, &is_foreground, SIZE, &mut alignment);
+            aligner.update(&now, &is_foreground, (SIZE.0, (0..SIZE.1).step_by(1)), &mut alignment);
         }
         let Alignment { gain, shift } = alignment;
         assert!((shift[0] - right).abs() < 0.08 && (shift[1] - down).abs() < 0.08, "{shift:?}");

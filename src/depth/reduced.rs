@@ -1,6 +1,9 @@
 //! Downsampled pictures in the square root of linear light: exposure and white balance are factors there, and noise is
 //! nearly uniform.
 
+use std::iter::StepBy;
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
 
 use crate::color::srgb_to_linear_table;
@@ -73,18 +76,18 @@ impl Reducer {
 
     /// Computes the block means of a picture.
     pub fn reduce(&mut self, color: &ColorImage, reduced: &mut Vec<[f32; 3]>) {
-        Arch::new().dispatch(Reduce { reducer: self, color, reduced });
+        self.reduce_rows(color, (0..reduced_size(color).1).step_by(1), reduced);
+    }
+
+    /// Computes some rows of the block means of a picture; the other rows of `reduced` stay.
+    pub fn reduce_rows(&mut self, color: &ColorImage, rows: StepBy<Range<usize>>, reduced: &mut Vec<[f32; 3]>) {
+        let (across, down) = reduced_size(color);
+        reduced.resize(across * down, [0.0; 3]);
+        Arch::new().dispatch(ReduceRows { reducer: self, color, rows, reduced });
     }
 
     #[inline(always)]
-    fn reduce_row(
-        &mut self,
-        color: &ColorImage,
-        block_px: usize,
-        across: usize,
-        row: usize,
-        reduced: &mut Vec<[f32; 3]>,
-    ) {
+    fn reduce_row(&mut self, color: &ColorImage, block_px: usize, row: usize, reduced: &mut [[f32; 3]]) {
         let (width, height) = (color.width as usize, color.height as usize);
         let lines = row * block_px..((row + 1) * block_px).min(height);
         self.sums.clear();
@@ -95,7 +98,7 @@ impl Reducer {
                 *sum += u16::from(code);
             }
         }
-        for block in 0..across {
+        for (block, roots) in reduced.iter_mut().enumerate() {
             let columns = block * block_px..((block + 1) * block_px).min(width);
             let weight = 1.0 / (columns.len() * lines.len()) as f32;
             let mut sums = [0; 3];
@@ -104,31 +107,29 @@ impl Reducer {
                     sums[p] += u32::from(pixel[p]);
                 }
             }
-            let mut roots = [0.0; 3];
             for p in 0..3 {
                 roots[p] = self.sqrt_light(sums[p] as f32 * weight);
             }
-            reduced.push(roots);
         }
     }
 }
 
-/// See [`Reducer::reduce`].
-struct Reduce<'a> {
+/// See [`Reducer::reduce_rows`].
+struct ReduceRows<'a> {
     reducer: &'a mut Reducer,
     color: &'a ColorImage,
-    reduced: &'a mut Vec<[f32; 3]>,
+    rows: StepBy<Range<usize>>,
+    reduced: &'a mut [[f32; 3]],
 }
 
-impl WithSimd for Reduce<'_> {
+impl WithSimd for ReduceRows<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { reducer, color, reduced } = self;
-        let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));
-        reduced.clear();
-        for row in 0..down {
-            reducer.reduce_row(color, block_px, across, row, reduced);
+        let Self { reducer, color, rows, reduced } = self;
+        let (block_px, (across, _)) = (block_px(color.width), reduced_size(color));
+        for row in rows {
+            reducer.reduce_row(color, block_px, row, &mut reduced[row * across..][..across]);
         }
     }
 }

@@ -35,7 +35,8 @@ impl BackgroundMemory {
         });
         if forgets.contains(&true) {
             self.assign_rounds_revision();
-            self.check_outlines(map, color, surface_step);
+            self.classify_cells(workers, map, surface_step);
+            self.check_outlines(map, color, surface_step, 0, 1);
         }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
+use super::cells::Cells;
 use super::{BackgroundMemory, FRAMES_PER_UPDATE};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
@@ -15,8 +16,8 @@ const ROWS: usize = 2;
 /// Upper bound of the round counter.
 const MAX_ROUNDS: u8 = 250;
 /// Rounds from which on a pixel's colour is only updated in one round of `REFRESH_ROUNDS`.
-const SURE: u8 = 8;
-const REFRESH_ROUNDS: usize = 4;
+pub(super) const SURE: u8 = 8;
+const REFRESH_ROUNDS: usize = 16;
 /// Interval in rounds at which a hidden pixel's counter decreases by one.
 const FADE_ROUNDS: usize = 2;
 /// Minimum distance to another surface of an updated pixel, in pixels: camera and depth map mix both closer by.
@@ -44,11 +45,15 @@ impl BackgroundMemory {
         let (size, update_index) = (self.size, self.frame / FRAMES_PER_UPDATE);
         self.assign_revision();
         self.mixed.clear(size);
+        let (mut y, mut first) = (0, 0);
         for pixel in &map.matte.pixels {
-            self.mixed.set(pixel.at as usize % size.0, pixel.at as usize / size.0);
+            while pixel.at as usize >= first + size.0 {
+                (y, first) = (y + 1, first + size.0);
+            }
+            self.mixed.set(pixel.at as usize - first, y);
         }
-        let Self { rgb, inverse, rounds, mixed, codes, .. } = self;
-        let view = UpdateInput { map, color, surface_step, mixed, codes, size, update_index };
+        let Self { rgb, inverse, rounds, mixed, codes, cells, .. } = self;
+        let view = UpdateInput { map, color, surface_step, mixed, codes, cells, size, update_index };
         let bands = Bands::new(size.1, 1, workers);
         let planes = bands.split(rgb, 3 * size.0).zip(bands.split(inverse, size.0)).zip(bands.split(rounds, size.0));
         workers.run_each(bands.rows().zip(planes), &|(rows, ((rgb, inverse), rounds))| {
@@ -65,6 +70,7 @@ struct UpdateInput<'a> {
     mixed: &'a Bitmap,
     /// Per code and channel, the code at the exposure of the remembered picture.
     codes: &'a [[u8; 256]; 3],
+    cells: &'a Cells,
     size: (usize, usize),
     update_index: usize,
 }
@@ -84,12 +90,24 @@ impl WithSimd for UpdateRows<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { view, rows, rgb, inverse, rounds } = self;
         let (width, first) = (view.size.0, rows.start);
+        let round = view.update_index / ROWS;
+        let fades = round.is_multiple_of(FADE_ROUNDS);
         for y in rows.filter(|y| y % ROWS == view.update_index % ROWS) {
+            let refreshes = (round + y).is_multiple_of(REFRESH_ROUNDS);
             for begin in (0..width).step_by(BLOCK) {
                 let count = (width - begin).min(BLOCK);
+                // Most of the picture is well known, or hidden.
+                if !refreshes && !view.cells.needs_update((begin, y), count, fades) {
+                    continue;
+                }
                 let at = (y - first) * width + begin;
                 let rounds = &mut rounds[at..][..count];
-                view.update_block((begin, y), &mut rgb[3 * at..][..3 * count], &mut inverse[at..][..count], rounds);
+                let (rgb, inverse) = (&mut rgb[3 * at..][..3 * count], &mut inverse[at..][..count]);
+                // Whole blocks with a constant number of pixels, so that all of them is vector code.
+                match count {
+                    BLOCK => view.update_block((begin, y), BLOCK, rgb, inverse, rounds),
+                    count => view.update_block((begin, y), count, rgb, inverse, rounds),
+                }
             }
         }
     }
@@ -98,8 +116,15 @@ impl WithSimd for UpdateRows<'_> {
 impl UpdateInput<'_> {
     /// Updates a block that begins at a pixel.
     #[inline(always)]
-    fn update_block(&self, (begin, y): (usize, usize), rgb: &mut [u8], inverse: &mut [f32], rounds: &mut [u8]) {
-        let (surface_step, count, at) = (self.surface_step, rounds.len().min(BLOCK), y * self.size.0 + begin);
+    fn update_block(
+        &self,
+        (begin, y): (usize, usize),
+        count: usize,
+        rgb: &mut [u8],
+        inverse: &mut [f32],
+        rounds: &mut [u8],
+    ) {
+        let (surface_step, at) = (self.surface_step, y * self.size.0 + begin);
         let (inverse, rounds) = (&mut inverse[..count], &mut rounds[..count]);
         let round = self.update_index / ROWS;
         let (fades, refreshes) = (round.is_multiple_of(FADE_ROUNDS), (round + y).is_multiple_of(REFRESH_ROUNDS));

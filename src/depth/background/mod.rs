@@ -29,6 +29,10 @@ use verification::OutlineEvidence;
 const SURFACE_STEP_PX: f32 = 2.0 * MIN_STEP_PX;
 /// Interval of the updates, in frames.
 const FRAMES_PER_UPDATE: usize = 4;
+/// Updates in which the rows of the reduced picture are compared in turn.
+const TURNS: usize = 4;
+/// Maximum relative change of the gain for which its tables stay valid: less than half a code.
+const GAIN_STEP: f32 = 1e-3;
 /// Number of rounds from which on a pixel is known; each round updates every row once.
 const MIN_ROUNDS: u8 = 2;
 /// The camera counts as moved if the alignment is off by more than this, in pixels, or if a larger fraction of the
@@ -61,16 +65,16 @@ pub struct BackgroundMemory {
     reduced: Vec<[f32; 3]>,
     has_value: Vec<bool>,
     hidden: Vec<bool>,
-    /// Whether it is visible and looks different from the memory.
+    /// Whether it is visible and looks different from the memory, in the row of [`TURNS`] that was compared last.
     changed: Vec<bool>,
     /// Evidence from beside the outlines, per cell.
     cell_evidence: Vec<OutlineEvidence>,
-    /// Scratch: steps of inverse depth at the pixels of a row, in 1/m.
-    outline_steps: Vec<f32>,
     reducer: Reducer,
     now: Vec<[f32; 3]>,
     aligner: Aligner,
     gain: [f32; 3],
+    /// The gain of the tables.
+    table_gain: [f32; 3],
     /// Linear light of each remembered code, by channel, at the current exposure.
     light: Box<[[f32; 256]; 3]>,
     own_light: Box<[f32; 256]>,
@@ -79,8 +83,10 @@ pub struct BackgroundMemory {
     /// Mixed pixels of the current matte, beside which nothing is learned.
     mixed: Bitmap,
     cells: Cells,
-    /// The revealed pixels of each band.
-    pixels: Vec<Vec<MixedPixel>>,
+    /// Whether the cells are those of the current map.
+    is_classified: bool,
+    /// The revealed pixels of each band, and scratch.
+    pixels: Vec<(Vec<MixedPixel>, Vec<(usize, u32)>)>,
 }
 
 impl Default for BackgroundMemory {
@@ -100,16 +106,17 @@ impl Default for BackgroundMemory {
             hidden: Vec::new(),
             changed: Vec::new(),
             cell_evidence: Vec::new(),
-            outline_steps: Vec::new(),
             reducer: Reducer::default(),
             now: Vec::new(),
             aligner: Aligner::default(),
             gain: [1.0; 3],
+            table_gain: [0.0; 3],
             light: Box::new([[0.0; 256]; 3]),
             own_light: srgb_to_linear_table(),
             codes: Box::new([[0; 256]; 3]),
             mixed: Bitmap::default(),
             cells: Cells::default(),
+            is_classified: false,
             pixels: Vec::new(),
         }
     }
@@ -137,17 +144,22 @@ impl BackgroundMemory {
         }
         self.time_ns = time_ns;
         self.frame += 1;
-        if time_ns < self.resumes_ns || !self.frame.is_multiple_of(FRAMES_PER_UPDATE) {
+        if time_ns < self.resumes_ns {
             return;
         }
         let surface_step = lens.inverse_depth_step(SURFACE_STEP_PX);
+        self.classify_cells(workers, map, surface_step);
+        self.is_classified = true;
+        if !self.frame.is_multiple_of(FRAMES_PER_UPDATE) {
+            return;
+        }
         if !self.estimate_exposure(map, color, surface_step) {
             self.reset(size);
             self.resumes_ns = time_ns.saturating_add(PAUSE_NS);
             return;
         }
         self.update_rows(workers, (map, color), surface_step);
-        self.check_outlines(map, color, surface_step);
+        self.check_outlines(map, color, surface_step, self.turn() % 2, 2);
         self.forget_changed(map, color, surface_step);
     }
 
@@ -185,6 +197,8 @@ impl BackgroundMemory {
         reset_buffer(&mut self.rounds, count);
         reset_buffer(&mut self.covering, count);
         self.reduced.clear();
+        self.cells.clear();
+        self.is_classified = false;
         self.gain = [1.0; 3];
         self.assign_revision();
     }
@@ -201,22 +215,27 @@ impl BackgroundMemory {
         self.revision.rounds = REVISIONS.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Returns the first of the rows of the reduced picture that are compared now.
+    fn turn(&self) -> usize {
+        self.frame / FRAMES_PER_UPDATE % TURNS
+    }
+
     /// Estimates the current exposure, and returns whether the camera has stayed in place.
     fn estimate_exposure(&mut self, map: &DepthMap, color: &ColorImage, surface_step: f32) -> bool {
         let size = reduced_size(color);
         let block_px = block_px(color.width);
-        self.reducer.reduce(color, &mut self.now);
-        let Self { now, reduced, has_value, hidden, rounds, inverse, .. } = self;
-        if reduced.len() != now.len() {
-            reduced.clone_from(now);
-            has_value.clear();
-            has_value.resize(now.len(), false);
-            hidden.resize(now.len(), false);
-            self.changed.resize(now.len(), false);
+        let rows = (self.turn()..size.1).step_by(TURNS);
+        let Self { now, reduced, has_value, hidden, rounds, inverse, changed, .. } = self;
+        if reduced.len() != size.0 * size.1 {
+            self.reducer.reduce(color, reduced);
+            reset_buffer(has_value, reduced.len());
+            reset_buffer(hidden, reduced.len());
+            reset_buffer(changed, size.0 * size.1.div_ceil(TURNS));
             self.aligner.invalidate();
         }
+        self.reducer.reduce_rows(color, rows.clone(), now);
         let middle = |at: usize, count: usize| (at * block_px + block_px / 2).min(count - 1);
-        for row in 0..size.1 {
+        for row in rows.clone() {
             for column in 0..size.0 {
                 let (at, place) =
                     (row * size.0 + column, middle(row, self.size.1) * self.size.0 + middle(column, self.size.0));
@@ -234,14 +253,20 @@ impl BackgroundMemory {
         // Exposure changes are estimated as a gain per channel, from the visible background only.
         let mut alignment = Alignment { gain: self.gain, ..Alignment::default() };
         self.aligner.shift_plate(reduced, size, [0.0; 2]);
-        self.aligner.update(now, hidden, size, &mut alignment);
+        self.aligner.update(now, hidden, (size.0, rows.clone()), &mut alignment);
         self.gain = alignment.gain;
-        self.reducer.fill_exposure_tables(self.gain, &mut self.light);
-        for (codes, gain) in self.codes.iter_mut().zip(self.gain) {
-            codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
+        if (0..3).any(|p| (self.gain[p] - self.table_gain[p]).abs() > GAIN_STEP * self.gain[p]) {
+            self.table_gain = self.gain;
+            self.reducer.fill_exposure_tables(self.gain, &mut self.light);
+            for (codes, gain) in self.codes.iter_mut().zip(self.gain) {
+                codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
+            }
         }
         let mut counts = [0usize; 2];
-        for (((now, then), hidden), changed) in now.iter().zip(&*reduced).zip(&*hidden).zip(&mut self.changed) {
+        changed.fill(false);
+        let places = rows.flat_map(|row| row * size.0..(row + 1) * size.0);
+        for (at, changed) in places.zip(changed) {
+            let (now, then, hidden) = (now[at], reduced[at], hidden[at]);
             let is_changed = (0..3).any(|p| {
                 then[p] * self.gain[p] < MAX_VALUE && (now[p] - then[p] * self.gain[p]).abs() > CHANGE_THRESHOLD
             });

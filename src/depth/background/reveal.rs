@@ -25,27 +25,39 @@ impl BackgroundMemory {
         if map.size() != color.size() || !self.is_usable_for(color) {
             return;
         }
-        let mut cells = std::mem::take(&mut self.cells);
-        let mut pixels = std::mem::take(&mut self.pixels);
         let surface_step = lens.inverse_depth_step(SURFACE_STEP_PX);
-        let known = BackgroundView { metres: &map.metres, rounds: &self.rounds, inverse: &self.inverse, surface_step };
-        let nearest = cells.classify(workers, size, &known);
-        cells.select_near_visible(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
-        self.cells = cells;
+        if !std::mem::take(&mut self.is_classified) {
+            self.classify_cells(workers, map, surface_step);
+        }
+        let nearest = self.cells.nearest_hiding;
+        self.cells.select_near_visible(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
+        let mut pixels = std::mem::take(&mut self.pixels);
+        let known = self.view(map, surface_step);
         let bands = Bands::new(size.1, 1, workers);
-        pixels.resize_with(bands.rows().count(), Vec::new);
-        workers.run_each(bands.rows().zip(&mut pixels), &|(rows, pixels)| {
-            Arch::new().dispatch(Reveal { background: self, map, color, known: &known, rows, pixels });
+        pixels.resize_with(bands.rows().count(), Default::default);
+        workers.run_each(bands.rows().zip(&mut pixels), &|(rows, (pixels, hidden))| {
+            Arch::new().dispatch(Reveal { background: self, map, color, known: &known, rows, pixels, hidden });
         });
         // The first band's vector is moved, not copied.
-        if let Some((first, others)) = pixels.split_first_mut() {
+        if let Some(((first, _), others)) = pixels.split_first_mut() {
             std::mem::swap(&mut map.matte.pixels, first);
-            others.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
+            others.iter().for_each(|(pixels, _)| map.matte.pixels.extend_from_slice(pixels));
         }
         if map.matte.pixels.len() > Matte::max_pixels(size.0, size.1) {
             map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
         self.pixels = pixels;
+    }
+
+    /// Classifies the cells of a map.
+    pub(super) fn classify_cells(&mut self, workers: &mut ThreadPool, map: &DepthMap, surface_step: f32) {
+        let mut cells = std::mem::take(&mut self.cells);
+        cells.classify(workers, self.size, &self.view(map, surface_step));
+        self.cells = cells;
+    }
+
+    fn view<'a>(&'a self, map: &'a DepthMap, surface_step: f32) -> BackgroundView<'a> {
+        BackgroundView { metres: &map.metres, rounds: &self.rounds, inverse: &self.inverse, surface_step }
     }
 
     /// Creates the matte entry of a pixel at `metres` that hides a known background.
@@ -69,32 +81,45 @@ struct Reveal<'a> {
     known: &'a BackgroundView<'a>,
     rows: Range<usize>,
     pixels: &'a mut Vec<MixedPixel>,
+    /// Of each selected cell, its first pixel in a row, and a bit for each pixel that hides a known background.
+    hidden: &'a mut Vec<(usize, u32)>,
 }
 
 impl WithSimd for Reveal<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { background, map, color, known, rows, pixels } = self;
+        let Self { background, map, color, known, rows, pixels, hidden } = self;
         let width = background.size.0;
         pixels.clear();
         let mut mixed = map.matte.pixels_in(rows.start * width..rows.end * width);
         for y in rows {
+            hidden.clear();
+            // All of a row first: these loads do not wait for one another.
             for columns in background.cells.selected_columns(y) {
-                let (first, end) = (y * width + columns.start, y * width + columns.end);
-                pixels.extend_from_slice(split_off_before(&mut mixed, first));
-                let (metres, rounds, inverse) = known.pixels(first, columns.len());
+                let (metres, rounds, inverse) = known.pixels(y * width + columns.start, columns.len());
                 let mut is_hiding = [0; CELL];
                 let hiding = &mut is_hiding[..columns.len()];
                 for k in 0..hiding.len() {
-                    hiding[k] = known.classify_pixel(metres[k], rounds[k], inverse[k]).1;
+                    hiding[k] = known.classify_pixel(metres[k], rounds[k], inverse[k]).1 << k;
                 }
-                let mut here = split_off_before(&mut mixed, end).iter().peekable();
-                for (k, hides) in hiding.iter().enumerate() {
+                hidden.push((y * width + columns.start, is_hiding.iter().fold(0, |all, bit| all | bit)));
+            }
+            for &(first, bits) in hidden.iter().filter(|(_, bits)| *bits != 0) {
+                pixels.extend_from_slice(split_off_before(&mut mixed, first));
+                let here = split_off_before(&mut mixed, first + CELL.min(width - (first - y * width)));
+                let create = |at: usize| background.create_mixed_pixel(at, map.metres[at], &color.rgb);
+                // Most cells have no mixed pixels, and hide all.
+                if here.is_empty() && bits == (1 << CELL) - 1 {
+                    pixels.extend((first..first + CELL).map(create));
+                    continue;
+                }
+                let mut here = here.iter().peekable();
+                for k in 0..CELL {
                     let at = first + k;
                     match here.next_if(|pixel| pixel.at as usize == at) {
                         Some(pixel) => pixels.push(*pixel),
-                        None if *hides != 0 => pixels.push(background.create_mixed_pixel(at, metres[k], &color.rgb)),
+                        None if bits >> k & 1 != 0 => pixels.push(create(at)),
                         None => {}
                     }
                 }

@@ -5,14 +5,17 @@
 //! behind the subject, and behind the object too, or else the old background would appear where the object continues
 //! behind the subject.
 
+use std::iter::StepBy;
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
 
 use super::cells::CELL;
-use super::{BackgroundMemory, MIN_ROUNDS};
+use super::{BackgroundMemory, MIN_ROUNDS, TURNS};
 use crate::depth::reduced::block_px;
 use crate::frame::{ColorImage, DepthMap};
 
-/// Sampling step of the search for outlines, in pixels.
+/// Sampling step at outlines, in pixels.
 const STEP: usize = 2;
 /// Distance from a sampled pixel at which the surface beyond an outline is read, and the further distance over which it
 /// has to continue, in pixels: closer by, camera and depth map mix both surfaces.
@@ -47,27 +50,27 @@ impl OutlineEvidence {
 }
 
 impl BackgroundMemory {
-    /// Forgets the background next to outlines beside which something else is seen.
-    pub(super) fn check_outlines(&mut self, map: &DepthMap, color: &ColorImage, surface_step: f32) {
+    /// Forgets the background next to outlines beside which something else is seen, in every `interval`-th row of cells from
+    /// `first` on.
+    pub(super) fn check_outlines(
+        &mut self,
+        map: &DepthMap,
+        color: &ColorImage,
+        surface_step: f32,
+        first: usize,
+        interval: usize,
+    ) {
         let (width, height) = self.size;
         let (across, down) = (width.div_ceil(CELL), height.div_ceil(CELL));
         let mut cell_evidence = std::mem::take(&mut self.cell_evidence);
         cell_evidence.clear();
         cell_evidence.resize(across * down, OutlineEvidence::default());
-        let mut steps = std::mem::take(&mut self.outline_steps);
-        steps.resize(width, 0.0);
         let seen = Comparison { memory: self, metres: &map.metres, surface_step, block_px: block_px(color.width) };
-        for y in (0..height).step_by(STEP) {
-            // Beyond the picture, the row itself stands in: it has no step to itself.
-            let above = y.checked_sub(BESIDE_PX).unwrap_or(y);
-            let below = Some(y + BESIDE_PX).filter(|&below| below < height).unwrap_or(y);
-            let rows = [above, y, below].map(|y| &map.metres[y * width..][..width]);
-            Arch::new().dispatch(FindSteps { rows, steps: &mut steps });
-            for x in (0..width).step_by(STEP).filter(|&x| steps[x] > MIN_STEP * surface_step) {
-                seen.collect_evidence((x, y), &mut cell_evidence[y / CELL * across + x / CELL]);
-            }
-        }
-        self.outline_steps = steps;
+        Arch::new().dispatch(CompareOutlines {
+            seen,
+            rows: (first..down).step_by(interval),
+            cell_evidence: &mut cell_evidence,
+        });
         let mut forgets = false;
         for (at, evidence) in
             cell_evidence.iter().enumerate().filter(|(_, evidence)| evidence.contradicting > evidence.agreeing)
@@ -90,15 +93,16 @@ impl BackgroundMemory {
         }
     }
 
-    /// Forgets visible surfaces whose colour has changed, away from hair and outlines.
+    /// Forgets visible surfaces whose colour has changed, away from hair and outlines, in the rows that were compared last.
     pub(super) fn forget_changed(&mut self, map: &DepthMap, color: &ColorImage, surface_step: f32) {
         let ((width, height), block_px) = (self.size, block_px(color.width));
         let across = width.div_ceil(block_px);
         let mut forgets = false;
-        for block in 0..self.changed.len() {
-            if !self.changed[block] {
+        for group in 0..self.changed.len() {
+            if !self.changed[group] {
                 continue;
             }
+            let block = (group / across * TURNS + self.turn()) * across + group % across;
             let (x, y) = (block % across * block_px, block / across * block_px);
             let (right, below) = ((x + CELL).min(width - 1), (y + CELL).min(height - 1));
             let around = [(x, y), (x.saturating_sub(CELL), y), (right, y), (x, y.saturating_sub(CELL)), (x, below)];
@@ -120,33 +124,31 @@ impl BackgroundMemory {
     }
 }
 
-/// Computes the largest step of inverse depth from each pixel of a row down to the surfaces on its four sides, in 1/m:
-/// few pixels are at outlines.
-struct FindSteps<'a> {
-    /// Metres of the row above, of the row itself, and of the row below, [`BESIDE_PX`] away.
-    rows: [&'a [f32]; 3],
-    steps: &'a mut [f32],
+/// Compares the background with what is beside the outlines of all cells.
+struct CompareOutlines<'a> {
+    seen: Comparison<'a>,
+    rows: StepBy<Range<usize>>,
+    cell_evidence: &'a mut [OutlineEvidence],
 }
 
-impl WithSimd for FindSteps<'_> {
+impl WithSimd for CompareOutlines<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { rows: [above, own, below], steps } = self;
-        let inverse = DepthMap::inverse_depth;
-        let beside = BESIDE_PX.min(own.len());
-        for ((farthest, &above), &below) in steps.iter_mut().zip(above).zip(below) {
-            *farthest = inverse(above).min(inverse(below));
-        }
-        for (farthest, &left) in steps[beside..].iter_mut().zip(own) {
-            *farthest = farthest.min(inverse(left));
-        }
-        for (farthest, &right) in steps.iter_mut().zip(&own[beside..]) {
-            *farthest = farthest.min(inverse(right));
-        }
-        for (step, &own) in steps.iter_mut().zip(own) {
-            *step = inverse(own) - *step;
+        let Self { seen, rows, cell_evidence } = self;
+        let ((width, height), min_step) = (seen.memory.size, MIN_STEP * seen.surface_step);
+        let across = width.div_ceil(CELL);
+        for row in rows {
+            for columns in seen.memory.cells.outline_columns(row, min_step) {
+                let evidence = &mut cell_evidence[row * across + columns.start / CELL];
+                for y in (row * CELL..((row + 1) * CELL).min(height)).step_by(STEP) {
+                    let steps = seen.find_steps(columns.clone(), y);
+                    for x in columns.clone().step_by(STEP).filter(|x| steps[x - columns.start] > min_step) {
+                        seen.collect_evidence((x, y), evidence);
+                    }
+                }
+            }
         }
     }
 }
@@ -160,6 +162,35 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
+    /// Computes the largest step of inverse depth from each pixel of a cell's row down to the surfaces on its four sides, in
+    /// 1/m: few pixels are at outlines.
+    #[inline(always)]
+    fn find_steps(&self, columns: Range<usize>, y: usize) -> [f32; CELL] {
+        let ((width, height), first, inverse) = (self.memory.size, columns.start, DepthMap::inverse_depth);
+        // Beyond the picture, the row itself stands in: it has no step to itself.
+        let above = y.checked_sub(BESIDE_PX).unwrap_or(y);
+        let below = Some(y + BESIDE_PX).filter(|&below| below < height).unwrap_or(y);
+        let [above, own, below] = [above, y, below].map(|y| &self.metres[y * width..][..width]);
+        let mut steps = [0.0; CELL];
+        let farthest = &mut steps[..columns.len()];
+        for ((farthest, &above), &below) in
+            farthest.iter_mut().zip(&above[columns.clone()]).zip(&below[columns.clone()])
+        {
+            *farthest = inverse(above).min(inverse(below));
+        }
+        let hidden = BESIDE_PX.saturating_sub(first).min(farthest.len());
+        for (farthest, &left) in farthest[hidden..].iter_mut().zip(&own[(first + hidden).saturating_sub(BESIDE_PX)..]) {
+            *farthest = farthest.min(inverse(left));
+        }
+        for (farthest, &right) in farthest.iter_mut().zip(&own[(first + BESIDE_PX).min(width)..]) {
+            *farthest = farthest.min(inverse(right));
+        }
+        for (step, &own) in farthest.iter_mut().zip(&own[columns]) {
+            *step = inverse(own) - *step;
+        }
+        steps
+    }
+
     /// Reads the surface beyond an outline on each side of a pixel in front, and adds the evidence to `evidence`.
     fn collect_evidence(&self, (x, y): (usize, usize), evidence: &mut OutlineEvidence) {
         let (width, height) = self.memory.size;
@@ -196,6 +227,7 @@ impl Comparison<'_> {
 
     fn has_changed(&self, (x, y): (usize, usize)) -> bool {
         let across = self.memory.size.0.div_ceil(self.block_px);
-        self.memory.changed.get(y / self.block_px * across + x / self.block_px).is_some_and(|&changed| changed)
+        let group = y / self.block_px / TURNS * across + x / self.block_px;
+        self.memory.changed.get(group).is_some_and(|&changed| changed)
     }
 }

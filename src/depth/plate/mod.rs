@@ -102,7 +102,7 @@ impl Plate {
         let Self { reduced, now, aligner, alignment, subject, .. } = self;
         for _ in 0..if self.has_started { 1 } else { FIRST_ITERATIONS } {
             aligner.shift_plate(reduced, size, alignment.shift);
-            aligner.update(now, &subject.foreground, size, alignment);
+            aligner.update(now, &subject.foreground, (size.0, (0..size.1).step_by(1)), alignment);
             aligner.shift_plate(reduced, size, alignment.shift);
             subject.segment(now, aligner.shifted_plate(), size, alignment);
         }
