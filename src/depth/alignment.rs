@@ -130,7 +130,7 @@ impl Aligner {
                 count += 1;
             }
         }
-        if count < pixels / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
+        if count == 0 || count < pixels / SAMPLING_STEP / MIN_BACKGROUND_DIVISOR {
             return None;
         }
         let mut below = 0;

@@ -133,6 +133,7 @@ impl BackgroundMemory {
         time_ns: u64,
     ) {
         let size = (color.width as usize, color.height as usize);
+        self.is_classified = false;
         if map.size() != color.size() || map.metres.is_empty() {
             self.size = (0, 0);
             return;
