@@ -1,4 +1,4 @@
-//! Convolution kernels: pointwise (1x1), im2col for larger filters, and depthwise. Checked against
+//! Convolution kernels: full, of which pointwise (1x1) ones are the simplest, and depthwise. Checked against
 //! `tests/reference.rs`.
 
 use pulp::{Simd, WithSimd};
@@ -13,12 +13,19 @@ const TILE_PIXELS_OF_TWO: usize = TILE_PIXELS / 2;
 /// Outputs of a row per tile of a depthwise filter.
 const ROW_TILE: usize = 8;
 
-/// Pointwise (1x1) convolution: a matrix product over channels, register-tiled.
-pub struct Pointwise<'a> {
-    /// `[block][pixel][lane]`.
+/// Convolution of a row of pixels: a matrix product, register-tiled. A pixel's inputs are a run of values in each part of
+/// the input: in pointwise (1x1) convolution the channels of each block, otherwise the values of each block in each line
+/// under the filter, tap by tap.
+pub struct Convolution<'a> {
+    /// `[part][pixel, step values apart][run]`.
     pub input: &'a [f32],
+    /// Values per part.
+    pub part: usize,
+    /// Values from pixel to pixel, and values under each.
+    pub step: usize,
+    pub run: usize,
     pub pixels: usize,
-    /// `[output block][channel][lane]`.
+    /// `[output block][part][value of the run][lane]`.
     pub weights: &'a [f32],
     /// `[output channel]`.
     pub bias: &'a [f32],
@@ -29,49 +36,63 @@ pub struct Pointwise<'a> {
     pub plane: usize,
 }
 
-impl WithSimd for Pointwise<'_> {
+impl WithSimd for Convolution<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let blocks = self.bias.len() / S::F32_LANES;
-        for block in (0..blocks / 2).map(|pair| 2 * pair) {
-            self.compute_block::<S, TILE_PIXELS_OF_TWO, 2>(simd, block);
-        }
-        if !blocks.is_multiple_of(2) {
-            self.compute_block::<S, TILE_PIXELS, 1>(simd, blocks - 1);
-        }
+        // Runs of a known length are unrolled.
+        let is_pointwise = self.run == S::F32_LANES && self.step == S::F32_LANES;
+        if is_pointwise { self.compute_blocks::<S, true>(simd) } else { self.compute_blocks::<S, false>(simd) }
     }
 }
 
-impl Pointwise<'_> {
+impl Convolution<'_> {
     #[inline(always)]
-    fn compute_block<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
+    fn compute_blocks<S: Simd, const POINTWISE: bool>(&mut self, simd: S) {
+        let blocks = self.bias.len() / S::F32_LANES;
+        for block in (0..blocks / 2).map(|pair| 2 * pair) {
+            self.compute_block::<S, POINTWISE, TILE_PIXELS_OF_TWO, 2>(simd, block);
+        }
+        if !blocks.is_multiple_of(2) {
+            self.compute_block::<S, POINTWISE, TILE_PIXELS, 1>(simd, blocks - 1);
+        }
+    }
+
+    #[inline(always)]
+    fn compute_block<S: Simd, const POINTWISE: bool, const N: usize, const M: usize>(&mut self, simd: S, block: usize) {
         let whole = self.pixels / N * N;
         // Full tiles first, then single pixels.
         for first in (0..whole).step_by(N) {
-            self.compute_tile::<S, N, M>(simd, block, first);
+            self.compute_tile::<S, POINTWISE, N, M>(simd, block, first);
         }
         for first in whole..self.pixels {
-            self.compute_tile::<S, 1, M>(simd, block, first);
+            self.compute_tile::<S, POINTWISE, 1, M>(simd, block, first);
         }
     }
 
     /// Computes `N` pixels of `M` blocks.
     #[inline(always)]
-    fn compute_tile<S: Simd, const N: usize, const M: usize>(&mut self, simd: S, block: usize, first: usize) {
-        let (plane, depth) = (self.pixels * S::F32_LANES, self.input.len() / self.pixels);
+    fn compute_tile<S: Simd, const POINTWISE: bool, const N: usize, const M: usize>(
+        &mut self,
+        simd: S,
+        block: usize,
+        first: usize,
+    ) {
+        let (step, run) = if POINTWISE { (S::F32_LANES, S::F32_LANES) } else { (self.step, self.run) };
+        let depth = self.input.len() / self.part * run;
         let weights: [&[S::f32s]; M] =
             std::array::from_fn(|m| &as_vectors::<S>(self.weights)[(block + m) * depth..][..depth]);
         let bias: [S::f32s; M] = std::array::from_fn(|m| as_vectors::<S>(self.bias)[block + m]);
         let mut sums = [bias; N];
-        for (part, input) in self.input.chunks_exact(plane).enumerate() {
-            let pixels = &input[first * S::F32_LANES..][..N * S::F32_LANES];
-            let weights = weights.map(|weights| &weights[part * S::F32_LANES..][..S::F32_LANES]);
-            for lane in 0..S::F32_LANES {
-                for (n, sums) in sums.iter_mut().enumerate() {
-                    let value = simd.splat_f32s(pixels[n * S::F32_LANES + lane]);
+        for (part, input) in self.input.chunks_exact(self.part).enumerate() {
+            let values = &input[first * step..][..(N - 1) * step + run];
+            let values: [&[f32]; N] = std::array::from_fn(|n| &values[n * step..][..run]);
+            let weights = weights.map(|weights| &weights[part * run..][..run]);
+            for k in 0..run {
+                for (values, sums) in values.iter().zip(&mut sums) {
+                    let value = simd.splat_f32s(values[k]);
                     for (sum, weights) in sums.iter_mut().zip(weights) {
-                        *sum = fma(simd, value, weights[lane], *sum);
+                        *sum = fma(simd, value, weights[k], *sum);
                     }
                 }
             }
@@ -86,54 +107,28 @@ impl Pointwise<'_> {
     }
 }
 
-/// Unfolds the inputs of one output row (im2col): every tap becomes a channel, so that the filter is a pointwise
-/// convolution. Values of `out` that are never written must be 0 (padding of channels), and so must those of `line`,
-/// a row with padding at both ends ([`Axis::padded_len`]).
-pub fn im2col_row(
-    input: &[f32],
-    size: &Size,
-    [down, across]: &[Axis; 2],
-    row: usize,
-    made: &Size,
-    line: &mut [f32],
-    out: &mut [f32],
-) {
-    let (rows, first_row) = down.taps_inside(row, size.rows);
+/// Copies the lines under the filter in one output row, for each tap and block of channels, to `lines`: with padding at
+/// both ends, where `lines` must be 0.
+pub fn copy_lines(input: &[f32], size: &Size, [down, across]: &[Axis; 2], row: usize, line: usize, lines: &mut [f32]) {
+    let (inside, first_row) = down.taps_inside(row, size.rows);
     let row_len = size.columns * size.lanes;
-    for (tap, block) in (0..down.taps).flat_map(|tap| (0..size.blocks()).map(move |block| (tap, block))) {
-        let inside = &mut line[across.padding * size.lanes..][..row_len];
-        if rows.contains(&tap) {
-            let start = block * size.plane() + (first_row + tap - rows.start) * row_len;
-            inside.copy_from_slice(&input[start..][..row_len]);
+    let places = (0..down.taps).flat_map(|tap| (0..size.blocks()).map(move |block| (tap, block)));
+    for ((tap, block), line) in places.zip(lines.chunks_exact_mut(line)) {
+        let line = &mut line[across.padding * size.lanes..][..row_len];
+        if inside.contains(&tap) {
+            let start = block * size.plane() + (first_row + tap - inside.start) * row_len;
+            line.copy_from_slice(&input[start..][..row_len]);
         } else {
-            inside.fill(0.0);
-        }
-        let channels = size.lanes.min(size.channels - block * size.lanes);
-        // In a single block without unused channels, all values under a row of the filter are adjacent.
-        let (runs, run) = match size.lanes == size.channels {
-            true => (1, across.taps * channels),
-            false => (across.taps, channels),
-        };
-        for column in 0..runs {
-            let (mut depth, mut from) = ((tap * across.taps + column) * size.channels + block * size.lanes, 0);
-            while from < run {
-                let lane = depth % made.lanes;
-                let count = (made.lanes - lane).min(run - from);
-                let pixels = out[depth / made.lanes * made.plane()..][..made.plane()].chunks_exact_mut(made.lanes);
-                let places = (column * size.lanes + from..).step_by(across.step * size.lanes);
-                for (pixel, place) in pixels.zip(places) {
-                    let values = pixel[lane..][..count].iter_mut().zip(&line[place..][..count]);
-                    values.for_each(|(out, value)| *out = *value);
-                }
-                (depth, from) = (depth + count, from + count);
-            }
+            line.fill(0.0);
         }
     }
 }
 
-/// Depthwise convolution with a stride of 1 or 2 along a row; `weights` are `[block][tap][lane]`.
+/// Depthwise convolution with a stride of 1 or 2 along a row, plus a picture; `weights` are `[block][tap][lane]`.
 pub struct Depthwise<'a> {
     pub input: &'a [f32],
+    /// Added to the result, after the activation.
+    pub b: Option<&'a [f32]>,
     pub size: Size,
     pub axes: [Axis; 2],
     pub weights: &'a [f32],
@@ -159,7 +154,7 @@ impl WithSimd for Depthwise<'_> {
 impl Depthwise<'_> {
     #[inline(always)]
     fn filter_rows<S: Simd, const STEP: usize>(self, simd: S) {
-        let Self { input, size, axes: [down, across], weights, bias, activation, out, result, lines } = self;
+        let Self { input, b, size, axes: [down, across], weights, bias, activation, out, result, lines } = self;
         let line = lines.len() / down.taps;
         let (row_len, taps) = (size.columns * S::F32_LANES, across.taps * S::F32_LANES);
         lines.fill(0.0);
@@ -168,7 +163,10 @@ impl Depthwise<'_> {
             let weights = &weights[block * down.taps * taps..][..down.taps * taps];
             let bias = load::<S>(bias, block * S::F32_LANES);
             let mut rows = input.chunks_exact(row_len).enumerate();
-            for (y, out) in out.chunks_exact_mut(result.columns * S::F32_LANES).enumerate() {
+            let b = b.map(|b| &b[block * result.plane()..][..result.plane()]);
+            let out_len = result.columns * S::F32_LANES;
+            for (y, out) in out.chunks_exact_mut(out_len).enumerate() {
+                let b = b.map(|b| as_vectors::<S>(&b[y * out_len..][..out_len]));
                 let (inside, first_row) = down.taps_inside(y, size.rows);
                 let last = first_row + inside.len();
                 // Read each input row into the ring buffer once, when the first output needs it.
@@ -184,23 +182,23 @@ impl Depthwise<'_> {
                 let out = as_vectors_mut::<S>(out);
                 let whole = result.columns / ROW_TILE * ROW_TILE;
                 for first in (0..whole).step_by(ROW_TILE) {
-                    filter_tile::<S, STEP, ROW_TILE>(simd, under.clone(), bias, activation, first, out);
+                    filter_tile::<S, STEP, ROW_TILE>(simd, under.clone(), b, (bias, activation), first, out);
                 }
                 for first in whole..result.columns {
-                    filter_tile::<S, STEP, 1>(simd, under.clone(), bias, activation, first, out);
+                    filter_tile::<S, STEP, 1>(simd, under.clone(), b, (bias, activation), first, out);
                 }
             }
         }
     }
 }
 
-/// Computes `N` outputs of a row from the lines under the filter and their taps.
+/// Computes `N` outputs of a row from the lines under the filter and their taps, and adds the row `b`.
 #[inline(always)]
 fn filter_tile<'a, S: Simd, const STEP: usize, const N: usize>(
     simd: S,
     under: impl Iterator<Item = (&'a [f32], &'a [f32])>,
-    bias: S::f32s,
-    activation: Activation,
+    b: Option<&[S::f32s]>,
+    (bias, activation): (S::f32s, Activation),
     first: usize,
     out: &mut [S::f32s],
 ) {
@@ -214,7 +212,11 @@ fn filter_tile<'a, S: Simd, const STEP: usize, const N: usize>(
             }
         }
     }
-    for (out, sum) in out[first..][..N].iter_mut().zip(sums) {
+    let out = &mut out[first..][..N];
+    for (out, sum) in out.iter_mut().zip(sums) {
         *out = activate(simd, activation, sum);
+    }
+    for (out, b) in out.iter_mut().zip(b.map_or(&[][..], |b| &b[first..][..N])) {
+        *out = simd.add_f32s(*out, *b);
     }
 }

@@ -15,7 +15,7 @@ use pulp::Arch;
 
 pub use model::is_tflite;
 
-use self::filters::{Depthwise, Pointwise, im2col_row};
+use self::filters::{Convolution, Depthwise, copy_lines};
 use self::kernels::{Elementwise, Logistic, Mean, Upsample};
 use self::model::{Activation, Model};
 use self::plan::{Operation, Plan, Step};
@@ -88,28 +88,44 @@ impl Step {
         let input = &slots[self.input][..size.len()];
         let (pixels, plane) = (size.pixels(), result.plane());
         let operand = |slot: &Option<usize>| slot.map(|slot| &slots[slot][..size.len()]);
+        let pointwise = |weights: &[f32], bias: &[f32], activation, out: &mut [f32]| {
+            let (part, step) = (size.plane(), size.lanes);
+            let run = step;
+            arch.dispatch(Convolution { input, part, step, run, pixels, weights, bias, activation, out, plane: part });
+        };
         match &self.operation {
-            Operation::Pointwise { weights, bias, unfolded: None } => {
-                arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out, plane });
-            }
-            Operation::Pointwise { weights, bias, unfolded: Some((axes, unfolded)) } => {
-                let (pixels, row_len) = (unfolded.pixels(), unfolded.plane());
-                let line = axes[1].padded_len(size.columns, unfolded.columns) * size.lanes;
-                scratch[..unfolded.len() + line].fill(0.0);
-                let (input_row, line) = scratch[..unfolded.len() + line].split_at_mut(unfolded.len());
+            Operation::Convolution { weights, bias, axes: None } => pointwise(weights, bias, activation, out),
+            Operation::Convolution { weights, bias, axes: Some(axes) } => {
+                let [down, across] = axes;
+                let (part, pixels) = (across.padded_len(size.columns, result.columns) * size.lanes, result.columns);
+                let (step, run) = (across.step * size.lanes, across.taps * size.lanes);
+                let lines = &mut scratch[..down.taps * size.blocks() * part];
+                lines.fill(0.0);
                 for row in 0..result.rows {
-                    im2col_row(input, &size, axes, row, unfolded, line, input_row);
-                    let out = &mut out[row * row_len..];
-                    arch.dispatch(Pointwise { input: input_row, pixels, weights, bias, activation, out, plane });
+                    copy_lines(input, &size, axes, row, part, lines);
+                    let (input, out) = (&*lines, &mut out[row * pixels * result.lanes..]);
+                    arch.dispatch(Convolution {
+                        input,
+                        part,
+                        step,
+                        run,
+                        pixels,
+                        weights,
+                        bias,
+                        activation,
+                        out,
+                        plane,
+                    });
                 }
             }
-            Operation::Depthwise { weights, bias, axes, lines } => {
+            Operation::Depthwise { weights, bias, axes, lines, b } => {
                 let (axes, lines) = (*axes, &mut scratch[..*lines]);
-                arch.dispatch(Depthwise { input, size, axes, weights, bias, activation, out, result, lines });
+                let b = b.map(|slot| &slots[slot][..result.len()]);
+                arch.dispatch(Depthwise { input, b, size, axes, weights, bias, activation, out, result, lines });
             }
             Operation::TransposedConvolution { weights, bias } => {
                 let (lanes, sums) = (size.lanes, &mut scratch[..pixels * bias.len()]);
-                arch.dispatch(Pointwise { input, pixels, weights, bias, activation, out: sums, plane: size.plane() });
+                pointwise(weights, bias, activation, sums);
                 // Pixel shuffle: the four channels of a pixel are 2x2 pixels of the result.
                 for (y, row) in out.chunks_exact_mut(result.columns).enumerate() {
                     let [left, right] = [2 * (y % 2), 2 * (y % 2) + 1].map(|channel| {
@@ -126,8 +142,16 @@ impl Step {
                 arch.dispatch(Elementwise { a: input, gate, b: operand(b), activation, out, plane });
             }
             Operation::Mean { b } => arch.dispatch(Mean { a: input, b: operand(b), out, plane: size.plane() }),
-            Operation::Upsample => {
-                let row = &mut scratch[..size.columns * size.lanes];
+            Operation::Upsample { filter } => {
+                let (row, sums) = scratch.split_at_mut(size.columns * size.lanes);
+                let input = match filter {
+                    None => input,
+                    Some((weights, bias)) => {
+                        let sums = &mut sums[..result.len() / 4];
+                        pointwise(weights, bias, Activation::None, sums);
+                        &*sums
+                    }
+                };
                 arch.dispatch(Upsample { input, size, row, out });
             }
         }

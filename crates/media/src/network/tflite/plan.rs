@@ -14,18 +14,19 @@ const MAX_WORK: usize = 1 << 35;
 
 /// The operation of a step.
 pub enum Operation {
-    /// Pointwise convolution, of the pixels themselves or of rows that im2col unfolds to this size.
-    Pointwise {
+    /// Convolution; a pointwise one has no axes.
+    Convolution {
         weights: Vec<f32>,
         bias: Vec<f32>,
-        unfolded: Option<([Axis; 2], Size)>,
+        axes: Option<[Axis; 2]>,
     },
-    /// Depthwise convolution; `lines` is the size of its ring buffer.
+    /// Depthwise convolution plus a picture; `lines` is the size of its ring buffer.
     Depthwise {
         weights: Vec<f32>,
         bias: Vec<f32>,
         axes: [Axis; 2],
         lines: usize,
+        b: Option<usize>,
     },
     /// Transposed convolution with stride 2 and one output channel: the sums are `[pixel][down][across]`.
     TransposedConvolution {
@@ -40,7 +41,10 @@ pub enum Operation {
     Mean {
         b: Option<usize>,
     },
-    Upsample,
+    /// Upsampling of the picture, or of its pointwise convolution.
+    Upsample {
+        filter: Option<(Vec<f32>, Vec<f32>)>,
+    },
 }
 
 /// A step, which reads and writes slots.
@@ -121,7 +125,7 @@ impl Plan {
             // Fuse the next operator if nothing else reads this output.
             while let Some(next) = operators.peek()
                 && planner.count_uses(operator.output) == 1
-                && let Some(both) = fuse_operators(&operator, next)
+                && let Some(both) = fuse_operators(&operator, next, &model.tensors)
             {
                 operator = both;
                 operators.next();
@@ -230,8 +234,8 @@ impl<'a> Planner<'a> {
             (OperatorKind::Convolution(steps), &[weights, bias]) => {
                 self.plan_convolution(size, &steps, [weights, bias])?
             }
-            (OperatorKind::Depthwise(steps), &[weights, bias]) if in_vectors && steps.across <= 2 => {
-                self.plan_depthwise(size, &steps, [weights, bias])?
+            (OperatorKind::Depthwise(steps), &[weights, bias, ref b @ ..]) if in_vectors && steps.across <= 2 => {
+                self.plan_depthwise(size, &steps, [weights, bias], b.first().copied())?
             }
             (OperatorKind::TransposedConvolution, &[weights, bias]) if in_vectors => {
                 Some(self.plan_transposed(size, [weights, bias])?)
@@ -257,9 +261,12 @@ impl<'a> Planner<'a> {
                 let mean = Planned { operation, size: Size { rows: 1, columns: 1, ..size }, work: size.pixels() };
                 b.is_none_or(|(_, b)| b == size).then_some(mean)
             }
+            (OperatorKind::Upsample, &[weights, bias]) if in_vectors => {
+                self.plan_filtered_upsampling(size, [weights, bias])?
+            }
             (OperatorKind::Upsample, _) if in_vectors => {
                 self.reserve_scratch(size.columns * self.lanes)?;
-                Some(Planned { operation: Operation::Upsample, size: size.doubled(), work: 4 })
+                Some(Planned { operation: Operation::Upsample { filter: None }, size: size.doubled(), work: 4 })
             }
             _ => None,
         })

@@ -135,7 +135,12 @@ fn gates_sums_means_and_enlargements() {
     net.add(OperatorKind::Mean, Activation::None, &[both], [1, 1, 1, channels]);
     let second = net.filter(Some(channels), [1, 1], ONE, Activation::Logistic);
     let scaled = net.add(OperatorKind::Scale, Activation::None, &[sum, second], [1, rows, columns, channels]);
-    let wide = net.add(OperatorKind::Upsample, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
+    net.add(OperatorKind::Upsample, Activation::None, &[scaled], [1, 2 * rows, 2 * columns, channels]);
+    let trunk = net.filter(Some(channels), [1, 1], ONE, Activation::None);
+    let filtered = net.filter(None, [3, 3], ONE, Activation::Relu);
+    let sum = net.add(OperatorKind::Sum, Activation::None, &[trunk, filtered], [1, 2 * rows, 2 * columns, channels]);
+    let filtered = net.filter(None, [3, 3], ONE, Activation::None);
+    let wide = net.add(OperatorKind::Sum, Activation::Relu, &[filtered, sum], [1, 2 * rows, 2 * columns, channels]);
     let (weights, bias) = (net.constant(&[1, 2, 2, channels]), net.constant(&[1]));
     let mask = net.add(
         OperatorKind::TransposedConvolution,
@@ -186,7 +191,7 @@ fn what_takes_too_long_or_too_much_memory_is_refused_before_it_runs() {
     // Weights that many operators share are packed for each.
     let mut net = Builder::new([1, 1, 1, 1]);
     let (weights, bias) = (net.constant(&[1 << 20, 1, 1, 1]), net.constant(&[1 << 20]));
-    for _ in 0..16 {
+    for _ in 0..64 {
         let inputs = [0, weights, bias];
         net.add(OperatorKind::Convolution(ONE), Activation::None, &inputs, [1, 1, 1, 1 << 20]);
     }
