@@ -1,7 +1,9 @@
 //! Person mask from a network, temporally smoothed where it is unsure.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::mask_postprocess::MaskPostProcessor;
-use super::picture_network::{NetworkOutput, PictureNetwork};
+use super::picture_network::PictureNetwork;
 use bokehcam::frame::{ColorImage, Mask};
 
 /// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
@@ -13,7 +15,8 @@ const MIN_ALPHA: f32 = 1e-6;
 /// Computes the person mask from frame to frame.
 pub struct PersonSegmenter {
     picture_network: PictureNetwork,
-    /// The network's mask after temporal smoothing.
+    /// The network's mask, and after temporal smoothing.
+    decoded: Vec<f32>,
     smoothed: Mask,
     mask_postprocess: MaskPostProcessor,
     mask: Mask,
@@ -29,6 +32,7 @@ impl PersonSegmenter {
     pub fn new(picture_network: PictureNetwork) -> Self {
         Self {
             picture_network,
+            decoded: Vec::new(),
             smoothed: Mask::default(),
             mask_postprocess: MaskPostProcessor::default(),
             mask: Mask::default(),
@@ -67,21 +71,40 @@ impl PersonSegmenter {
             return Ok(());
         }
         let output = self.picture_network.run()?;
-        let pixels = output.size.0 * output.size.1;
-        let beyond = |alpha: f32| !(-0.01..=1.01).contains(&alpha);
-        self.is_logits |= (0..pixels).any(|pixel| beyond(output.at(pixel, output.channels - 1)));
+        // Of two channels, the second one is the person.
+        output.read_channel(output.channels - 1, &mut self.decoded);
+        self.is_logits |= self.decoded.iter().fold(false, |is, value| is | !(-0.01..=1.01).contains(value));
+        if self.is_logits {
+            for (pixel, value) in self.decoded.iter_mut().enumerate() {
+                *value = sigmoid(*value - if output.channels == 1 { 0.0 } else { output.at(pixel, 0) });
+            }
+        }
         let size = (output.size.0 as u32, output.size.1 as u32);
         let before_ns = self.seen_ns.filter(|_| (self.smoothed.width, self.smoothed.height) == size);
         let previous_weight = before_ns.map_or(0.0, |before_ns| previous_weight(time_ns.abs_diff(before_ns)));
         self.smoothed.resize(size.0, size.1);
-        for (pixel, alpha) in self.smoothed.alpha.iter_mut().enumerate() {
-            let new = decode_alpha(&output, pixel, self.is_logits);
-            let keeps = previous_weight * uncertainty(new);
-            *alpha = new + (*alpha - new) * keeps;
-        }
+        Arch::new().dispatch(Smooth { new: &self.decoded, previous_weight, smoothed: &mut self.smoothed.alpha });
         self.seen_ns = Some(time_ns);
         self.mask_postprocess.postprocess(&self.smoothed, time_ns, &mut self.mask);
         Ok(())
+    }
+}
+
+/// Averages the undecided pixels of a mask with those of the previous frame, which `smoothed` has.
+struct Smooth<'a> {
+    new: &'a [f32],
+    previous_weight: f32,
+    smoothed: &'a mut [f32],
+}
+
+impl WithSimd for Smooth<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (alpha, &new) in self.smoothed.iter_mut().zip(self.new) {
+            let new = if new < MIN_ALPHA { 0.0 } else { new.min(1.0) };
+            *alpha = new + (*alpha - new) * (self.previous_weight * uncertainty(new));
+        }
     }
 }
 
@@ -90,23 +113,13 @@ fn previous_weight(gap_ns: u64) -> f32 {
     PREVIOUS_WEIGHT.powf((gap_ns as f32 / FRAME_NS).max(1.0))
 }
 
-/// Returns the mask value: of two channels, the second one is the person.
-fn decode_alpha(output: &NetworkOutput, pixel: usize, is_logits: bool) -> f32 {
-    let own = output.at(pixel, output.channels - 1);
-    let alpha = match (is_logits, output.channels) {
-        (false, _) => own.min(1.0),
-        (true, 1) => sigmoid(own),
-        (true, _) => sigmoid(own - output.at(pixel, 0)),
-    };
-    if alpha < MIN_ALPHA { 0.0 } else { alpha }
-}
-
 fn sigmoid(value: f32) -> f32 {
     1.0 / (1.0 + (-value).exp())
 }
 
 /// Returns the uncertainty of a mask value: 1 at one half, 0 at 0 and 1. Approximates binary entropy by a power of a
 /// parabola.
+#[inline(always)]
 fn uncertainty(alpha: f32) -> f32 {
     let off = 2.0 * alpha - 1.0;
     // The power 3/4, by roots, which take a fraction of its time.

@@ -58,6 +58,17 @@ impl NetworkOutput<'_> {
         let pixels = self.size.0 * self.size.1;
         self.values[if self.is_planar { channel * pixels + pixel } else { pixel * self.channels + channel }]
     }
+
+    /// Replaces `into` by the numbers of a channel.
+    pub fn read_channel(&self, channel: usize, into: &mut Vec<f32>) {
+        let pixels = self.size.0 * self.size.1;
+        into.clear();
+        if self.is_planar || self.channels == 1 {
+            into.extend_from_slice(&self.values[channel * pixels..][..pixels]);
+        } else {
+            into.extend((0..pixels).map(|pixel| self.at(pixel, channel)));
+        }
+    }
 }
 
 /// Returns width and height for a variable input size: small, and divisible by the usual strides of networks.
