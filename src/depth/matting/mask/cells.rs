@@ -64,8 +64,7 @@ impl MaskView<'_> {
     /// Returns the linear light of a pixel.
     #[inline(always)]
     pub fn light_at(&self, at: usize) -> [f32; 3] {
-        let rgb = &self.color.rgb[3 * at..][..3];
-        [self.light[usize::from(rgb[0])], self.light[usize::from(rgb[1])], self.light[usize::from(rgb[2])]]
+        self.color.rgb.as_chunks::<3>().0[at].map(|code| self.light[usize::from(code)])
     }
 
     /// Interpolates the mask vertically, to a row of pixels.
@@ -160,17 +159,13 @@ impl MaskView<'_> {
         (at as f32 + 0.5 - half) / self.cell_px as f32
     }
 
-    /// Splits pixel columns at the centres of cells; returns each part, and the two columns of cells whose centres
-    /// enclose it: the same one twice at the border.
+    /// Returns the two columns of cells whose centres enclose a column of pixels, the same one twice at the border, and
+    /// the first column of pixels that they do not enclose.
     #[inline(always)]
-    pub fn split_at_centres(&self, xs: Range<usize>) -> impl Iterator<Item = (Range<usize>, [usize; 2])> {
-        let (cell_px, last, mut start) = (self.cell_px, self.across - 1, xs.start);
-        std::iter::from_fn(move || {
-            let passed = (start + cell_px - cell_px / 2) / cell_px;
-            let part = start..(passed * cell_px + cell_px / 2).min(xs.end);
-            start = part.end;
-            (!part.is_empty()).then_some((part, [passed.saturating_sub(1), passed.min(last)]))
-        })
+    pub fn columns_around(&self, x: usize) -> ([usize; 2], usize) {
+        let half = self.cell_px / 2;
+        let passed = (x + self.cell_px - half) / self.cell_px;
+        ([passed.saturating_sub(1), passed.min(self.across - 1)], passed * self.cell_px + half)
     }
 
     /// Iterates over the cells within `radius` of a cell, including itself.

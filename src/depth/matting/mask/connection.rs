@@ -1,6 +1,6 @@
 //! Connection of pixels to the near surface: a mere likeness in colour is not enough to be near.
 
-use crate::depth::bitmap::{Bitmap, WORD, set_bits};
+use crate::depth::bitmap::{Bitmap, WORD};
 
 /// Finds which pixels are connected to the near surface, 64 pixels of a row at a time; owns the memory for it.
 #[derive(Debug, Default)]
@@ -25,9 +25,8 @@ impl Connection {
         self.connected.set_word(x, y, seeds);
     }
 
-    /// Sets the alpha of candidates to 0 that no path over others connects to a seed, along sides or corners. `alphas`
-    /// is `width` pixels wide.
-    pub fn discard_unconnected(&mut self, width: usize, alphas: &mut [f32]) {
+    /// Finds the candidates that a path over others connects to a seed, along sides or corners.
+    pub fn connect(&mut self) {
         let Self { candidates, connected, front } = self;
         let ((candidates, across), (connected, _)) = (candidates.words(), connected.words());
         front.clear();
@@ -48,10 +47,12 @@ impl Connection {
                 }
             }
         }
-        for (at, (candidates, connected)) in candidates.iter().zip(&*connected).enumerate() {
-            let first = at / across * width + at % across * WORD;
-            set_bits(candidates & !connected).for_each(|place| alphas[first + place] = 0.0);
-        }
+    }
+
+    /// Returns the unconnected candidates as bits of the pixels from (`x`, `y`) on to the right.
+    #[inline(always)]
+    pub fn unconnected_at(&self, (x, y): (usize, usize)) -> u64 {
+        self.candidates.word_at(x, y) & !self.connected.word_at(x, y)
     }
 }
 
@@ -88,22 +89,14 @@ mod tests {
         let is_island = |x: usize, y: usize| x > 150 && y < 5;
         let mut connection = Connection::default();
         connection.clear((width, height));
-        let mut alphas = vec![0.1; width * height];
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let is_candidate = is_path(x, y) || is_island(x, y);
             connection.add((x, y), u64::from(is_candidate), u64::from((x, y) == (50, 0)));
-            alphas[y * width + x] = if is_candidate { 0.5 } else { 0.1 };
         }
-        connection.discard_unconnected(width, &mut alphas);
+        connection.connect();
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let expected = if is_path(x, y) {
-                0.5
-            } else if is_island(x, y) {
-                0.0
-            } else {
-                0.1
-            };
-            assert_eq!(alphas[y * width + x], expected, "{x}, {y}");
+            let is_unconnected = connection.unconnected_at((x, y)) & 1 != 0;
+            assert_eq!(is_unconnected, is_island(x, y) && !is_path(x, y), "{x}, {y}");
         }
     }
 }

@@ -51,7 +51,7 @@ pub struct MaskMatting {
     runs: Vec<Run>,
     models: Models,
     buffers: RowBuffers,
-    /// Alpha of the pixels in the unknown region.
+    /// Alpha of the pixels in the unknown region, in raster order.
     alphas: Vec<f32>,
     connection: Connection,
     /// Cells whose background blur may reveal.
@@ -143,19 +143,22 @@ impl pulp::WithSimd for ComputeMatte<'_> {
         if follows_color {
             models.fit(simd, &view, cells);
         }
-        alphas.resize(width * height, 0.0);
+        alphas.clear();
         connection.clear((width, height));
         view.compute_alphas((runs, models, &matting.posterior), &mut matting.buffers, alphas, connection);
-        connection.discard_unconnected(width, alphas);
+        connection.connect();
         if backdrop.is_some() {
             view.mark_around_band(cells, REVEALED_CELLS, revealed);
         }
-        // In raster order, which is that of the matte's pixels.
+        let mut alphas = alphas.as_slice();
+        // In raster order, which is that of the matte's pixels, and of alpha.
         for runs in runs.chunk_by(|a, b| a.row == b.row) {
             for y in view.pixel_rows(runs[0].row) {
                 for Run { cell, row, xs } in runs.iter().cloned() {
                     if cell == Cell::Band {
-                        view.separate_pixels(models, (xs, y), alphas, map);
+                        let (own, later) = alphas.split_at(xs.len());
+                        alphas = later;
+                        view.separate_pixels(models, (xs, y), (own, connection), map);
                         continue;
                     }
                     if let Some(backdrop) = backdrop {

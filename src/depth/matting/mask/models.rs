@@ -19,6 +19,16 @@ const MIN_WEIGHT: f32 = 0.5;
 /// Variance of a background picture's light: noise, and half a pixel of shift.
 const NOISE: f32 = 2e-4;
 
+/// Columns on both sides of a cell that are within [`RADIUS`], by distance in rows.
+const HALVES: [usize; RADIUS + 1] = {
+    let (mut halves, mut row) = ([0; RADIUS + 1], 0);
+    while row <= RADIUS {
+        halves[row] = (RADIUS * RADIUS - row * row).isqrt();
+        row += 1;
+    }
+    halves
+};
+
 /// Weights of the cells around one, by row and column.
 type Kernel = [[f32; 2 * RADIUS + 1]; 2 * RADIUS + 1];
 
@@ -183,6 +193,7 @@ impl Models {
     #[inline(always)]
     fn gather_colors(&mut self, view: &MaskView, cells: &[Cell], row: usize) {
         let Self { sums, columns, mask_row, .. } = self;
+        let step = view.cell_px / 2;
         let (cells, sums) = (&cells[row * view.across..], &mut sums[row * view.across..]);
         columns.iter().for_each(|&column| sums[column] = Sums::NONE);
         for y in view.pixel_rows(row) {
@@ -192,27 +203,28 @@ impl Models {
             let first = y * view.color.width as usize;
             view.interpolate_mask_row(y, mask_row);
             for &column in &*columns {
-                // Of the pixels, one in two suffices; of pure cells, one in four, which count twice.
-                let (pure, shift) = match cells[column] {
+                // Two pixels of a row suffice, in places that differ from row to row; of pure cells, of every other row.
+                let (pure, row) = match cells[column] {
                     Cell::Band => (None, y),
                     _ if y % 2 == 1 => continue,
                     Cell::Near => (Some(1.0), y / 2),
                     Cell::Far => (Some(0.0), y / 2),
                 };
-                let (mut own, xs) = (sums[column], view.pixel_columns(column));
-                for x in (xs.start + (xs.start + shift) % 2..xs.end).step_by(2) {
+                let (sums, xs) = (&mut sums[column], view.pixel_columns(column));
+                for x in (xs.start + row % step..xs.end).step_by(step) {
                     let light = view.light_at(first + x);
                     match pure.unwrap_or_else(|| view.mask_at(mask_row, x)) {
-                        alpha if alpha > SURE => own.add(NEAR, light),
-                        alpha if alpha < 1.0 - SURE => own.add(FAR, light),
+                        alpha if alpha > SURE => sums.add(NEAR, light),
+                        alpha if alpha < 1.0 - SURE => sums.add(FAR, light),
                         _ => {}
                     }
                 }
-                sums[column] = own;
             }
         }
-        for &column in columns.iter().filter(|column| cells[**column] != Cell::Band) {
-            sums[column].0.iter_mut().for_each(|sum| *sum *= 2.0);
+        // The weight of each is that of the pixels it stands for, where half of a cell's count.
+        for &column in &*columns {
+            let weight = if cells[column] == Cell::Band { 0.5 } else { 1.0 } * step as f32;
+            sums[column].0.iter_mut().for_each(|sum| *sum *= weight);
         }
     }
 
@@ -220,11 +232,11 @@ impl Models {
     #[inline(always)]
     fn sum_around<S: Simd>(&self, simd: S, view: &MaskView, (row, column): (usize, usize)) -> Sums {
         let mut around = Sums::NONE;
-        let columns = column.saturating_sub(RADIUS)..(column + RADIUS + 1).min(view.across);
-        let all = (1 << columns.len()) - 1;
         for other_row in row.saturating_sub(RADIUS)..(row + RADIUS + 1).min(view.down) {
-            let weights = &self.kernel[other_row + RADIUS - row];
-            for place in set_bits(self.needed.word_at(columns.start, other_row) & all) {
+            let (weights, half) = (&self.kernel[other_row + RADIUS - row], HALVES[other_row.abs_diff(row)]);
+            let columns = column.saturating_sub(half)..(column + half + 1).min(view.across);
+            let within = (1 << columns.len()) - 1;
+            for place in set_bits(self.needed.word_at(columns.start, other_row) & within) {
                 let other = columns.start + place;
                 let sums = &self.sums[other_row * view.across + other];
                 around.add_weighted(simd, sums, weights[other + RADIUS - column]);

@@ -10,6 +10,7 @@ use super::models::{INVERSE, LINE, MODEL, Models, SURFACES};
 use super::outline::clarity;
 use super::posterior::{LANES, Lanes, Posterior};
 use super::{CONNECTED_FROM, NEAR_FROM};
+use crate::compute::simd::prefetch;
 use crate::depth::matting::contrast::MAX_PRECISION;
 use crate::depth::matting::{fast_max, fast_min};
 use crate::depth::tap::Tap;
@@ -59,7 +60,7 @@ impl MaskView<'_> {
         &self,
         (runs, models, posterior): (&[Run], &Models, &Posterior),
         buffers: &mut RowBuffers,
-        alphas: &mut [f32],
+        alphas: &mut Vec<f32>,
         connection: &mut Connection,
     ) {
         buffers.resize(self.color.width as usize);
@@ -70,8 +71,11 @@ impl MaskView<'_> {
                 self.interpolate_mask_row(y, &mut buffers.mask_row);
                 for xs in in_band.clone().map(|run| run.xs.clone()) {
                     self.read_pixels((xs.clone(), y), buffers);
-                    for (part, columns) in self.split_at_centres(xs.clone()) {
-                        self.compute_part(models, posterior, (part, &down, columns), buffers);
+                    let mut start = xs.start;
+                    while start < xs.end {
+                        let (columns, end) = self.columns_around(start);
+                        self.compute_part(models, posterior, (start..end.min(xs.end), &down, columns), buffers);
+                        start = end;
                     }
                     if let Some(given) = self.given {
                         let given = &given.alpha[y * self.color.width as usize..];
@@ -80,7 +84,7 @@ impl MaskView<'_> {
                             *alpha = given[x] + (*alpha - given[x]) * clarity(buffers.precision[x]);
                         }
                     }
-                    alphas[y * self.color.width as usize..][xs.clone()].copy_from_slice(&buffers.alpha[xs.clone()]);
+                    alphas.extend_from_slice(&buffers.alpha[xs.clone()]);
                     add_connected((xs, y), buffers, connection);
                 }
             }
@@ -92,11 +96,19 @@ impl MaskView<'_> {
     fn read_pixels(&self, (xs, y): (Range<usize>, usize), buffers: &mut RowBuffers) {
         let RowBuffers { mask_row, mask, light, behind, .. } = buffers;
         let [red, green, blue] = light;
-        let first = y * self.color.width as usize;
+        let width = self.color.width as usize;
+        let first = y * width;
+        // The rows of a run lie too far apart for the processor to foresee them.
+        if let Some(next) = self.color.rgb.get(3 * (first + width + xs.start)..3 * (first + width + xs.end)) {
+            prefetch(next);
+        }
         let light = red[xs.clone()].iter_mut().zip(&mut green[xs.clone()]).zip(&mut blue[xs.clone()]);
-        for ((k, mask), ((red, green), blue)) in xs.clone().zip(&mut mask[xs.clone()]).zip(light) {
-            *mask = self.mask_at(mask_row, k);
-            [*red, *green, *blue] = self.light_at(first + k);
+        let codes = &self.color.rgb.as_chunks::<3>().0[first..][xs.clone()];
+        for (((red, green), blue), codes) in light.zip(codes) {
+            [*red, *green, *blue] = codes.map(|code| self.light[usize::from(code)]);
+        }
+        for (x, mask) in xs.clone().zip(&mut mask[xs.clone()]) {
+            *mask = self.mask_at(mask_row, x);
         }
         if let Some(backdrop) = self.backdrop {
             let background_at = backdrop.light_in_row(y);

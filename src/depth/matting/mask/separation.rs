@@ -5,8 +5,10 @@
 use std::ops::Range;
 
 use super::cells::MaskView;
+use super::connection::Connection;
 use super::models::{INVERSE, Models, SURFACES};
 use super::posterior::{LANES, Lanes};
+use crate::depth::bitmap::{WORD, set_bits};
 use crate::depth::matting::contrast::{QUANTISATION, SHRINKAGE};
 use crate::depth::matting::{NEARLY_PURE, fast_max, fast_min};
 use crate::frame::{DepthMap, MixedPixel};
@@ -28,26 +30,36 @@ struct Batch {
 }
 
 impl MaskView<'_> {
-    /// Writes the depth of pixels of a row in the unknown region, and adds the mixed ones. With a known background,
-    /// pixels that the near surface covers are mixed ones, too.
+    /// Writes the depth of pixels of a row in the unknown region, and adds the mixed ones, given alpha of each and which
+    /// are unconnected: surely far. With a known background, pixels that the near surface covers are mixed ones, too.
     #[inline(always)]
-    pub fn separate_pixels(&self, models: &Models, (xs, y): (Range<usize>, usize), alphas: &[f32], map: &mut DepthMap) {
+    pub fn separate_pixels(
+        &self,
+        models: &Models,
+        (xs, y): (Range<usize>, usize),
+        (alphas, connection): (&[f32], &Connection),
+        map: &mut DepthMap,
+    ) {
         let (first, down) = (y * self.color.width as usize, self.enclosing_cells(y, self.down));
         let background_at = self.backdrop.map(|backdrop| backdrop.light_in_row(y));
         let max_alpha = if background_at.is_some() { f32::INFINITY } else { NEARLY_PURE };
-        let (metres, alphas) = (&mut map.metres[first..], &alphas[first..]);
+        let metres = &mut map.metres[first..];
         let mut batch = Batch::default();
-        for (part, columns) in self.split_at_centres(xs.clone()) {
-            let (mut has_surfaces, mut sides) = (None, [[0.0; PARAMS]; 2]);
-            for x in part {
-                let alpha = alphas[x];
-                if !(1.0 - NEARLY_PURE..=max_alpha).contains(&alpha) {
-                    continue;
+        let (mut columns, mut end, mut has_surfaces, mut sides) = ([0; 2], 0, false, [[0.0; PARAMS]; 2]);
+        for (start, alphas) in xs.clone().step_by(WORD).zip(alphas.chunks(WORD)) {
+            let unconnected = connection.unconnected_at((start, y));
+            let (mut mixed, mut near) = (0, 0);
+            for (place, alpha) in alphas.iter().enumerate() {
+                mixed |= u64::from((*alpha >= 1.0 - NEARLY_PURE) & (*alpha <= max_alpha)) << place;
+                near |= u64::from(*alpha > 0.5) << place;
+            }
+            for place in set_bits(mixed & !unconnected) {
+                let (x, alpha) = (start + place, alphas[place]);
+                if x >= end {
+                    (columns, end) = self.columns_around(x);
+                    let found = models.beside(SURFACES, self.across, &down, columns);
+                    (has_surfaces, sides) = (found.is_some(), found.unwrap_or_default());
                 }
-                // Parts without mixed pixels need no surfaces.
-                let has_surfaces = *has_surfaces.get_or_insert_with(|| {
-                    models.beside(SURFACES, self.across, &down, columns).map(|found| sides = found).is_some()
-                });
                 let along = self.place_of(x) - columns[0] as f32;
                 let mut params = [0.0; PARAMS];
                 for n in 0..PARAMS {
@@ -68,11 +80,12 @@ impl MaskView<'_> {
                     batch.separate(&mut map.matte.pixels);
                 }
             }
+            near &= !unconnected;
+            for (place, metres) in metres[start..][..alphas.len()].iter_mut().enumerate() {
+                *metres = if near >> place & 1 != 0 { DepthMap::SUBJECT_M } else { *metres };
+            }
         }
         batch.separate(&mut map.matte.pixels);
-        for (metres, alpha) in metres[xs.clone()].iter_mut().zip(&alphas[xs]) {
-            *metres = if *alpha > 0.5 { DepthMap::SUBJECT_M } else { *metres };
-        }
     }
 }
 
