@@ -96,7 +96,7 @@ const fn pack_steps(axis: usize) -> f64 {
 }
 
 /// Values of the `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 31] = [
+pub const CONSTANTS: [(&str, f64); 32] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("UNBOUNDED_COLOR", UNBOUNDED_COLOR as f64),
