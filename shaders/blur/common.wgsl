@@ -23,6 +23,7 @@ override TRUSTED_STEPS: f32;        // lines up to this length are fully trusted
 override ONE_ENDED_FACTOR: f32;     // length factor of a line with one end
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes are linear within each octave
 override OCTAVE_SHIFT: u32;         // right shift of a float that leaves its node in the octave
+override SPLINE_LEFT: f32;          // see src/bokeh/bank/reduced.rs
 override EXTRA_TAPS: u32;           // taps beyond the aperture in filters for reduced scales
 
 // Workgroup sizes, in pixels or elements of the pass: squares, lines, row tiles and result tiles of a bin.

@@ -32,7 +32,7 @@ fn bin_radius_px(k: u32, coc_px: f32) -> f32 {
     var radius_px = coc_px;
     if bins[k].scale > 1u {
         let s = f32(bins[k].scale);
-        radius_px = sqrt(max(coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0, 0.0)) / s;
+        radius_px = sqrt(max(coc_px * coc_px - (SPLINE_LEFT * s * s + 1.0) / 3.0, 0.0)) / s;
     }
     return min(radius_px, bins[k].max_radius_px);
 }

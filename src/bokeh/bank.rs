@@ -9,7 +9,7 @@ mod reduced;
 use super::Rank;
 use super::aperture::Mask;
 use super::low_rank::Decomposition;
-pub use reduced::{EXTRA_TAPS, compensated_radius_px};
+pub use reduced::{EXTRA_TAPS, SPLINE_LEFT, compensated_radius_px};
 
 use reduced::ReducedTaps;
 

@@ -9,6 +9,8 @@
 /// How far the correlation of the spline is undone: 2 is nearest to the aperture, but rings beside lights; with less, what
 /// is left of the spline's blur is made up by a smaller radius ([`compensated_radius_px`]).
 const UNDONE: f64 = 1.65;
+/// Three times what the variance of the part that is left subtracts from a squared radius, in squared pixels of a bin.
+pub const SPLINE_LEFT: f32 = 4.0 * (2.0 - UNDONE as f32);
 /// Taps beyond the aperture that undo the correlation.
 pub const EXTRA_TAPS: usize = 2;
 /// Taps on either side of the filter that undoes the correlation: it decays by a factor of 0.27 from tap to tap.
@@ -24,9 +26,8 @@ pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
     if scale == 1 {
         return coc_px;
     }
-    const LEFT: f32 = 4.0 * (2.0 - UNDONE as f32);
     let s = scale as f32;
-    (coc_px * coc_px - (LEFT * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
+    (coc_px * coc_px - (SPLINE_LEFT * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
 }
 
 /// Samples profiles for reduced scales.

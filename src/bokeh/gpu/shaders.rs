@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::bokeh::bank::{EXTRA_TAPS, OCTAVE_SHIFT, OCTAVES_FROM_PX};
+use crate::bokeh::bank::{EXTRA_TAPS, OCTAVE_SHIFT, OCTAVES_FROM_PX, SPLINE_LEFT};
 use crate::bokeh::occlusion::{
     DIRECTIONS, FADE_FRACTION, HALF_SIMILAR_PX, MARGIN_PX, MAX_STEPS, MIN_OWN_COVERAGE, ONE_ENDED_FACTOR,
     ONE_SURFACE_PX, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL, TRUSTED_STEPS,
@@ -96,7 +96,7 @@ const fn pack_steps(axis: usize) -> f64 {
 }
 
 /// Values of the `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 32] = [
+pub const CONSTANTS: [(&str, f64); 33] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("UNBOUNDED_COLOR", UNBOUNDED_COLOR as f64),
@@ -121,6 +121,7 @@ pub const CONSTANTS: [(&str, f64); 32] = [
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("EXTRA_TAPS", EXTRA_TAPS as f64),
+    ("SPLINE_LEFT", SPLINE_LEFT as f64),
     ("TILE", TILE as f64),
     ("SMALL_TILE", SMALL_TILE as f64),
     ("WORKGROUP_1D", WORKGROUP_1D as f64),
