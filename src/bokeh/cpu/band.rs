@@ -9,7 +9,7 @@ use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums, Row};
 use super::fill::{HalfPictureBand, InpaintedBackground};
-use super::rows::STRIP;
+use super::rows::PIECE;
 use super::tent::{MARGIN, PADDED_BLOCK};
 use super::tiles::{BLOCK, Run, TILE_H, TILE_W, Tiles, extend_range};
 use super::unpack::{InputFrame, Surfaces};
@@ -108,9 +108,9 @@ impl Band<'_> {
             Inpainting::Done { first, .. } if self.first_pending[block] > *first => return,
             Inpainting::Done { .. } => {}
         }
-        // Adjacent columns of equal content are done together, in whole strips of every bin.
+        // Adjacent columns of equal content are done together, in whole pieces of every bin.
         let coarsest = self.bins.iter().flatten().map(|bin| bin.scale).max().unwrap_or(1);
-        let step = STRIP * coarsest;
+        let step = TILE_W.max(PIECE * coarsest);
         let end = block * BLOCK + columns;
         let last = end.min(self.source.size.0);
         let mut x0 = block * BLOCK;
@@ -151,42 +151,44 @@ impl Band<'_> {
         )
     }
 
-    /// Returns which bins some columns of a block contribute to, and how many rows beyond the band these need; clears
-    /// the other bins there.
+    /// Returns how many bins some columns of a block contribute to, and these in front; and how many rows beyond the band
+    /// they need. Clears the other bins there.
     #[inline(always)]
-    fn find_active_bins(&mut self, run: Run, content: Content) -> ([bool; MAX_BINS], isize) {
+    fn find_active_bins(&mut self, run: Run, content: Content) -> (usize, [usize; MAX_BINS], isize) {
         let Run { block, x0, columns, .. } = run;
         let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns.next_multiple_of(TILE_W));
         let is_filled = matches!(self.inpainting, Inpainting::Done { .. });
-        let mut active = [false; MAX_BINS];
-        let mut support = 0;
-        for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
+        let (mut count, mut active, mut support) = (0, [0; MAX_BINS], 0);
+        for (k, bin) in self.bins.iter_mut().enumerate() {
             let Some(bin) = bin else { continue };
             if !is_filled && k >= self.first_pending[block] {
                 continue;
             }
-            *active = match content {
+            let is_active = match content {
                 Content::One(only) => k == only,
                 Content::Mixed => {
                     let overlaps = |weight| self.tiles.any_overlapping(weight, tile_columns.clone(), tile_rows.clone());
                     is_filled || bin.weight.as_ref().is_none_or(overlaps)
                 }
             };
-            match *active {
-                true => support = support.max(bin.scale as isize / 2),
+            match is_active {
+                true => {
+                    (active[count], support) = (k, support.max(bin.scale as isize / 2));
+                    count += 1;
+                }
                 false => bin.clear(run),
             }
         }
-        (active, support)
+        (count, active, support)
     }
 
     /// Adds some columns of a block to the bins.
     #[inline(always)]
     fn process_run<V: Simd>(&mut self, simd: V, run: Run, content: Content) {
         let Run { x0, columns, .. } = run;
-        let (active, support) = self.find_active_bins(run, content);
+        let (count, active, support) = self.find_active_bins(run, content);
         let is_read = matches!(self.inpainting, Inpainting::Pending { .. });
-        if !active.contains(&true) && !is_read {
+        if count == 0 && !is_read {
             return;
         }
         let (tile_columns, tile_rows) = self.tiles_around(x0..x0 + columns);
@@ -231,8 +233,8 @@ impl Band<'_> {
                 }
             };
             let at = (run, y - first);
-            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut *sums).zip(active).filter(|(_, active)| *active) {
-                let Some(bin) = bin else { continue };
+            for &k in &active[..count] {
+                let (Some(bin), sums) = (&mut self.bins[k], &mut sums[k]) else { continue };
                 match bin.scale {
                     1 => bin.add_row::<V, 1>(simd, sums, at, surfaces, row),
                     2 => bin.add_row::<V, 2>(simd, sums, at, surfaces, row),

@@ -8,9 +8,9 @@ use pulp::Simd;
 
 use super::bin::{BinRows, BinSums};
 use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
-use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
+use super::rows::{CELL_PLANES, EMPTY_CELL, PIECE, STRIP, STRIP_CELLS, STRIP_ROW};
 use super::steady::steady;
-use super::tent::{MARGIN, PADDED_BLOCK, VectorWeight, is_zero};
+use super::tent::{MARGIN, PADDED_BLOCK, SUM_PLANES, VectorWeight, is_zero};
 use super::tiles::Run;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, MIN_COVERAGE};
@@ -18,12 +18,6 @@ use crate::compute::simd::{load, prefetch, store};
 
 /// Rows between the row being stored and the row being prefetched, which is far away in memory.
 const PREFETCH_ROWS: usize = 2;
-
-/// Returns the offset of row `row` of the strip at column `x`.
-#[inline(always)]
-fn strip_row_offset(across: usize, x: usize, row: usize) -> usize {
-    (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
-}
 
 impl BinRows<'_> {
     /// Removes all content of a run.
@@ -34,10 +28,8 @@ impl BinRows<'_> {
             let filled = self.filled_mut(row, run);
             let was_filled = *filled;
             *filled &= !run.is_whole;
-            if was_filled {
-                let first = row * self.across + x0 / STRIP;
-                let count = width.div_ceil(STRIP).min(self.across - x0 / STRIP);
-                self.out[first * STRIP_CELLS..][..count * STRIP_CELLS].fill(0.0);
+            for row in (row * CELL..(row + 1) * CELL).filter(|_| was_filled) {
+                self.clear_columns(x0, width, row);
             }
         }
         let across = self.size.0.div_ceil(CELL);
@@ -51,7 +43,17 @@ impl BinRows<'_> {
     /// Returns row `row` of the strip at column `x`.
     #[inline(always)]
     fn strip_row_mut(&mut self, x: usize, row: usize) -> &mut [f32] {
-        &mut self.out[strip_row_offset(self.across, x, row)..][..STRIP_ROW]
+        &mut self.out[(row / CELL * self.across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW..][..STRIP_ROW]
+    }
+
+    /// Clears some columns of a row, in whole pieces.
+    #[inline(always)]
+    fn clear_columns(&mut self, x0: usize, width: usize, row: usize) {
+        for x in (x0..(x0 + width).min(self.across * STRIP)).step_by(PIECE) {
+            for plane in self.strip_row_mut(x, row).as_chunks_mut::<STRIP>().0 {
+                plane[x % STRIP..][..PIECE].fill(0.0);
+            }
+        }
     }
 
     /// Repeats the last column up to the end of the last strip.
@@ -89,11 +91,8 @@ impl BinRows<'_> {
     /// Clears a row without content in this bin.
     #[inline(always)]
     pub(super) fn clear_row<const S: usize>(&mut self, (run, row): (Run, usize), sums: &BinSums) {
-        let x0 = run.x0 / S;
         if sums.stale {
-            for x in (0..(run.columns / S).min(self.across * STRIP - x0)).step_by(STRIP) {
-                self.strip_row_mut(x0 + x, row).fill(0.0);
-            }
+            self.clear_columns(run.x0 / S, run.columns / S, row);
         }
     }
 
@@ -109,24 +108,25 @@ impl BinRows<'_> {
         let weight = VectorWeight::new(simd, &self.weight);
         for x in (0..run.columns.min(self.across * STRIP - run.x0)).step_by(V::F32_LANES) {
             let taken = weight.surface_weights(simd, surfaces, MARGIN + x);
+            let at = (run.x0 + x) % STRIP;
             let out = self.strip_row_mut(run.x0 + x, row);
             if is_zero(simd, taken) {
                 if sums.stale {
                     for p in 0..4 {
-                        store::<V>(out, p * STRIP + x % STRIP, simd.splat_f32s(0.0));
+                        store::<V>(out, p * STRIP + at, simd.splat_f32s(0.0));
                     }
                 }
                 continue;
             }
             let values = weight.apply(simd, taken, surfaces, MARGIN + x);
             // The strips of the next rows are far away in memory.
-            let ahead = &self.strip_row_mut(run.x0 + x, (row + PREFETCH_ROWS).min(self.rows - 1))[x % STRIP..];
+            let ahead = &self.strip_row_mut(run.x0 + x, (row + PREFETCH_ROWS).min(self.rows - 1))[at..];
             for p in 0..4 {
                 prefetch(&ahead[p * STRIP..][..V::F32_LANES]);
             }
             let out = self.strip_row_mut(run.x0 + x, row);
             for p in 0..4 {
-                store::<V>(out, p * STRIP + x % STRIP, values[p]);
+                store::<V>(out, p * STRIP + at, values[p]);
             }
             // At full scale a pixel is its own mean: its colour counts whatever its weight. For two surfaces it is the
             // colour of their weighted sum.
@@ -167,36 +167,40 @@ impl BinRows<'_> {
     #[inline(always)]
     pub(super) fn store_row<V: Simd, const S: usize>(&mut self, simd: V, (run, row): (Run, usize), sums: &mut BinSums) {
         let (x0, width) = (run.x0 / S, run.columns / S);
-        let means = &mut sums.means.0;
-        for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
-            if self.is_steadied {
-                let last = &self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
-                for k in (0..STRIP).step_by(V::F32_LANES) {
-                    steady(simd, (last, k, STRIP), &mut means[..4], x + k);
-                }
-            }
-            let out = &mut self.out[strip_row_offset(self.across, x0 + x, row)..][..STRIP_ROW];
-            for p in 0..4 {
-                out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);
-            }
-            prefetch(self.strip_row_mut(x0 + x, (row + 1).min(self.rows - 1)));
-        }
-        *self.filled_mut(row / CELL, run) = true;
         let (floor, one) = (simd.splat_f32s(MIN_COVERAGE), simd.splat_f32s(1.0));
-        for x in (0..width).step_by(V::F32_LANES) {
-            let coverage = load::<V>(&means[3], x);
+        let is_steadied = self.is_steadied;
+        for x in (0..width.min(self.across * STRIP - x0)).step_by(V::F32_LANES) {
+            let at = (x0 + x) % STRIP;
+            let mut values = [one; SUM_PLANES];
+            for p in 0..SUM_PLANES {
+                values[p] = load::<V>(&sums.means.0[p], x);
+            }
+            let out = self.strip_row_mut(x0 + x, row);
+            if is_steadied {
+                steady(simd, out, at, &mut values);
+            }
+            for p in 0..4 {
+                store::<V>(out, p * STRIP + at, values[p]);
+            }
             let mut own = None;
             if self.needs_color_range {
                 // Unpremultiplied; the floor avoids amplifying the colour of almost empty pixels.
-                let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
+                let inverse = simd.div_f32s(one, simd.max_f32s(values[3], floor));
                 let mut colors = [inverse; 3];
                 for p in 0..3 {
-                    colors[p] = simd.mul_f32s(load::<V>(&means[p], x), inverse);
+                    colors[p] = simd.mul_f32s(values[p], inverse);
                 }
                 own = Some(colors);
             }
-            accumulate_columns(simd, &mut sums.cells, x, [coverage, load::<V>(&means[4], x)], own);
+            accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
+            if at.is_multiple_of(PIECE) {
+                let ahead = self.strip_row_mut(x0 + x, (row + 1).min(self.rows - 1));
+                for p in 0..4 {
+                    prefetch(&ahead[p * STRIP + at..][..PIECE]);
+                }
+            }
         }
+        *self.filled_mut(row / CELL, run) = true;
     }
 
     #[inline(always)]

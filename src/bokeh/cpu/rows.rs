@@ -12,6 +12,8 @@ use crate::compute::simd::prefetch;
 const ROW_PADDING: usize = 64;
 /// Columns of a strip: the output of one part of the blur pass.
 pub const STRIP: usize = 32;
+/// Columns of a piece of a strip, which the pass `bin` fills or clears as a whole: cells, and a vector.
+pub const PIECE: usize = 2 * CELL;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
 pub struct PlanarRows<const CH: usize> {

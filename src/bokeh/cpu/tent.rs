@@ -73,14 +73,16 @@ pub fn accumulate_whole_row<S: Simd>(
     [above, below]: [&mut [f32; PADDED_BLOCK]; 2],
     fresh: [bool; 2],
 ) {
-    let weights = weights.map(|weight| simd.splat_f32s(weight));
+    let weights = [simd.splat_f32s(weights[0]), simd.splat_f32s(weights[1])];
+    for (row, is_fresh) in [(&mut *above, fresh[0]), (&mut *below, fresh[1])] {
+        if is_fresh {
+            row[..columns + 2 * MARGIN].fill(0.0);
+        }
+    }
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
         let value = load::<S>(values, x);
-        for (row, (weight, fresh)) in [&mut *above, &mut *below].into_iter().zip(weights.into_iter().zip(fresh)) {
-            let weighted = match fresh {
-                true => simd.mul_f32s(value, weight),
-                false => fma(simd, value, weight, load::<S>(row, x)),
-            };
+        for (row, weight) in [(&mut *above, weights[0]), (&mut *below, weights[1])] {
+            let weighted = fma(simd, value, weight, load::<S>(row, x));
             store::<S>(row, x, weighted);
         }
     }
@@ -121,10 +123,13 @@ impl<S: Simd> VectorWeight<S> {
         if !surfaces.mixed {
             return back;
         }
-        let front = scale_surface(simd, taken[1], &surfaces.front, x);
         let (alpha, behind) = (load::<S>(&surfaces.alpha.0, x), load::<S>(&surfaces.behind.0, x));
-        // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
         let one = simd.splat_f32s(1.0);
+        if simd.first_true_m32s(simd.less_than_f32s(simd.sub_f32s(behind, alpha), one)) == S::F32_LANES {
+            return back;
+        }
+        let front = scale_surface(simd, taken[1], &surfaces.front, x);
+        // Parts of the farther surface that are known but not visible count only in bins without the nearer one.
         let unseen = simd.sub_f32s(simd.add_f32s(behind, alpha), one);
         let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_WEIGHT), front[3]), one);
         let behind = simd.sub_f32s(behind, simd.mul_f32s(unseen, hidden));

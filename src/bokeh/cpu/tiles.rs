@@ -29,9 +29,9 @@ const NO_BIN: u8 = u8::MAX;
 #[derive(Clone, Copy)]
 pub struct Run {
     pub block: usize,
-    /// The first column: a whole strip of every bin.
+    /// The first column: a whole piece of every bin ([`PIECE`](super::rows::PIECE)).
     pub x0: usize,
-    /// Rounded up to whole strips of every bin, also beyond the picture.
+    /// Rounded up to whole pieces of every bin, also beyond the picture.
     pub columns: usize,
     /// Whether these are all columns of the block.
     pub is_whole: bool,
