@@ -13,7 +13,7 @@ use super::enlarge::{CodeRows, Enlarge};
 use super::layers::Layers;
 use super::pixels::Sample;
 use super::rows::{STRIP_ROW, Slot};
-use super::sample::{read_in_focus, sample_bin};
+use super::sample::{SampledLines, read_in_focus, sample_bin};
 use super::silhouettes::Silhouettes;
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{InputFrame, Surfaces, compression_factor, compute_coc_row};
@@ -50,13 +50,24 @@ pub struct CompositeScratch {
     layers: Layers,
     in_focus: Surfaces<CHUNK>,
     codes: CodeRows,
+    lines: SampledLines,
+    color: CacheAligned<[[f32; CHUNK]; 3]>,
+    coc_px: [f32; CHUNK],
     /// What each tile of the row shows.
     contents: Vec<Content>,
 }
 
 impl CompositeScratch {
     pub fn new() -> Self {
-        Self { layers: Layers::new(), in_focus: Surfaces::new(), codes: CodeRows::new(), contents: Vec::new() }
+        Self {
+            layers: Layers::new(),
+            in_focus: Surfaces::new(),
+            codes: CodeRows::new(),
+            lines: CacheAligned([[0.0; _]; 4]),
+            color: CacheAligned([[0.0; CHUNK]; 3]),
+            coc_px: [0.0; CHUNK],
+            contents: Vec::new(),
+        }
     }
 }
 
@@ -67,8 +78,10 @@ enum Content {
     Still,
     /// One bin at a reduced scale, alone.
     One(usize),
-    /// Several bins, or parts of one. What is in focus may hide parts of one bin at a reduced scale.
-    Mixed(Option<usize>),
+    /// Several blurred bins, or parts of one.
+    Blurred,
+    /// Something in focus, which may hide parts of one bin at a reduced scale, or of several.
+    InFocus(Option<usize>),
 }
 
 impl Content {
@@ -76,8 +89,8 @@ impl Content {
     fn enlarged(self) -> Option<usize> {
         match self {
             Self::One(bin) => Some(bin),
-            Self::Mixed(bin) => bin,
-            Self::Still => None,
+            Self::InFocus(bin) => bin,
+            Self::Still | Self::Blurred => None,
         }
     }
 }
@@ -141,9 +154,11 @@ impl<T: Sample> Composite<'_, T> {
                 && T::as_codes(&mut []).is_some()
                 && !others.any(|(_, bin)| self.has_content(bin, tile))
         });
+        let is_in_focus = |sharp| self.plan.bin_weight(sharp).overlaps(self.tiles.ranges[at]);
         match blurred {
-            Some(blurred) if only == Some(blurred) => Content::One(blurred),
-            _ => Content::Mixed(blurred),
+            _ if sharp.is_some_and(is_in_focus) => Content::InFocus(blurred),
+            Some(blurred) => Content::One(blurred),
+            None => Content::Blurred,
         }
     }
 
@@ -174,18 +189,23 @@ impl<T: Sample> Composite<'_, T> {
     #[inline(always)]
     fn show<S: Simd>(&mut self, simd: S, content: Content, columns: Range<usize>, out: &mut [T]) {
         let width = self.plan.width;
-        if matches!(content, Content::Mixed(_)) {
-            self.plan.bins.iter().for_each(|bin| self.prefetch(bin, columns.clone()));
-        }
         let rows = self.y0..self.y0 + (out.len() / (width * 3)).max(1);
+        if matches!(content, Content::Blurred | Content::InFocus(_)) {
+            self.plan.bins.iter().for_each(|bin| self.prefetch(bin, columns.clone()));
+            rows.clone().for_each(|y| self.frame.prefetch(y, columns.start as isize, columns.len()));
+        }
         let may_be_near =
             self.plan.compositing == Compositing::Layers && self.silhouettes.may_be_near(columns.clone(), rows.clone());
         for (y, row) in rows.zip(out.chunks_exact_mut(width * 3)) {
             match content {
                 Content::Still => self.copy_source(y, columns.clone(), row),
                 Content::One(_) => {}
-                Content::Mixed(blurred) => {
-                    self.composite_row(simd, y, columns.clone(), blurred.is_some(), may_be_near, row)
+                Content::Blurred => {
+                    self.scratch.layers.clear();
+                    self.composite_columns(simd, (columns.start, y), 0..columns.len(), may_be_near, row);
+                }
+                Content::InFocus(behind) => {
+                    self.composite_in_focus(simd, y, columns.clone(), behind.is_some(), may_be_near, row)
                 }
             }
         }
@@ -198,10 +218,10 @@ impl<T: Sample> Composite<'_, T> {
         row[values.clone()].copy_from_slice(&self.pixels[y * self.plan.width * 3..][values]);
     }
 
-    /// Composites the bins of a row at some columns of the picture, a chunk at most. What is behind may be `shown`
-    /// already.
+    /// Composites what is in focus over the bins of a row at some columns of the picture, a chunk at most. What is
+    /// behind may be `shown` already.
     #[inline(always)]
-    fn composite_row<S: Simd>(
+    fn composite_in_focus<S: Simd>(
         &mut self,
         simd: S,
         y: usize,
@@ -211,32 +231,23 @@ impl<T: Sample> Composite<'_, T> {
         row: &mut [T],
     ) {
         let (x0, count) = (columns.start, columns.len());
-        self.scratch.layers.clear();
-        let Some(sharp) = self.plan.sharp_bin() else {
-            return self.composite_columns(simd, (x0, y), 0..count, may_be_near, row);
-        };
-        // Whole vectors, also beyond the picture.
         let CompositeScratch { layers, in_focus, .. } = &mut *self.scratch;
-        let (weight, vectors) = (self.plan.bin_weight(sharp), count.next_multiple_of(TILE_W));
+        layers.clear();
+        // Whole vectors, also beyond the picture.
+        let (weight, vectors) = (self.plan.bin_weight(0), count.next_multiple_of(TILE_W));
         read_in_focus(simd, self.frame, &weight, (x0, y), vectors, in_focus, layers.next_buffer());
-        let mut start = 0;
-        while start < count {
-            let covers = self.scratch.layers.next_covers(simd, start);
-            let mut end = start + S::F32_LANES;
-            while end < count && self.scratch.layers.next_covers(simd, end) == covers {
-                end += S::F32_LANES;
-            }
-            let columns = start..end.min(count);
-            match covers {
-                Some(true) => self.copy_source(y, x0 + columns.start..x0 + columns.end, row),
+        layers.push(&self.plan.bins[0]);
+        // Only what is between the outermost vectors that are partly in focus is composited.
+        let mut partly = count..0;
+        for x in (0..count).step_by(S::F32_LANES) {
+            match self.scratch.layers.front_covers(simd, x) {
+                Some(true) => self.copy_source(y, x0 + x..x0 + (x + S::F32_LANES).min(count), row),
                 Some(false) if is_shown => {}
-                _ => {
-                    self.scratch.layers.push(&self.plan.bins[sharp]);
-                    self.composite_columns(simd, (x0, y), columns, may_be_near, row);
-                    self.scratch.layers.clear();
-                }
+                _ => partly = partly.start.min(x)..(x + S::F32_LANES).min(count),
             }
-            start = end;
+        }
+        if !partly.is_empty() {
+            self.composite_columns(simd, (x0, y), partly, may_be_near, row);
         }
     }
 
@@ -250,14 +261,14 @@ impl<T: Sample> Composite<'_, T> {
         may_be_near: bool,
         row: &mut [T],
     ) {
-        let (plan, mut color, mut coc_px) = (self.plan, CacheAligned([[0.0; CHUNK]; 3]), [0.0; CHUNK]);
         let of_picture = x0 + columns.start..x0 + columns.end;
-        match plan.compositing {
+        match self.plan.compositing {
             Compositing::Layers => {
-                let layers = &mut self.scratch.layers;
-                for bin in &plan.bins {
-                    let slot = &self.slots[bin.slot];
-                    if sample_bin(simd, bin, slot, (x0, y), columns.clone(), layers.next_buffer()) {
+                let CompositeScratch { layers, in_focus, lines, color, coc_px, .. } = &mut *self.scratch;
+                let is_coc_known = !layers.is_empty() && !in_focus.mixed;
+                for bin in &self.plan.bins {
+                    let (slot, buffer) = (&self.slots[bin.slot], layers.next_buffer());
+                    if sample_bin(simd, bin, slot, (x0, y), columns.clone(), lines, buffer) {
                         layers.push(bin);
                     }
                 }
@@ -266,17 +277,19 @@ impl<T: Sample> Composite<'_, T> {
                 let tiles = self.y0 / TILE_H * self.tiles.across;
                 let tiles = tiles + of_picture.start / TILE_W..tiles + of_picture.end.div_ceil(TILE_W);
                 let is_one_surface = proximity.is_none() && layers.have_one_surface(&self.tiles.ranges[tiles]);
-                if !is_one_surface {
+                if !is_one_surface && !is_coc_known {
                     compute_coc_row(self.frame, y, of_picture.start, &mut coc_px[columns.clone()]);
                 }
+                let coc_px = if is_coc_known { &in_focus.back.0[3] } else { coc_px };
                 let vectors = columns.start..columns.end.next_multiple_of(S::F32_LANES);
-                layers.composite(simd, vectors, &proximity, &coc_px, is_one_surface, &mut color);
+                layers.composite(simd, vectors, &proximity, coc_px, is_one_surface, color);
             }
-            Compositing::Select => self.select_by_coc(simd, (x0, y), columns.clone(), &mut color.0),
-            Compositing::Gather => copy_gathered(self.gathered, plan.width, y, x0, &mut color.0),
+            Compositing::Select => self.select_by_coc(simd, (x0, y), columns.clone()),
+            Compositing::Gather => copy_gathered(self.gathered, self.plan.width, y, x0, &mut self.scratch.color.0),
         }
-        compress_highlights(&mut color.0, columns.clone(), self.frame.expansion);
-        T::write::<S>(&color.0, columns, self.encoder, &mut row[of_picture.start * 3..of_picture.end * 3]);
+        let color = &mut self.scratch.color.0;
+        compress_highlights(color, columns.clone(), self.frame.expansion);
+        T::write::<S>(color, columns, self.encoder, &mut row[of_picture.start * 3..of_picture.end * 3]);
     }
 
     /// Prefetches what some `columns` show of a bin.
@@ -294,18 +307,13 @@ impl<T: Sample> Composite<'_, T> {
 
     /// Computes the colour of some `columns` of a chunk from the bins at each pixel's own CoC, by their weights.
     #[inline(always)]
-    fn select_by_coc<S: Simd>(
-        &mut self,
-        simd: S,
-        (x0, y): (usize, usize),
-        columns: Range<usize>,
-        color: &mut [[f32; CHUNK]; 3],
-    ) {
-        let layer = self.scratch.layers.next_buffer();
-        let mut coc = [0.0; CHUNK];
+    fn select_by_coc<S: Simd>(&mut self, simd: S, (x0, y): (usize, usize), columns: Range<usize>) {
+        let CompositeScratch { layers, lines, color: CacheAligned(color), coc_px: coc, .. } = &mut *self.scratch;
+        let layer = layers.next_buffer();
+        color.as_flattened_mut().fill(0.0);
         compute_coc_row(self.frame, y, x0 + columns.start, &mut coc[columns.clone()]);
         for (k, bin) in self.plan.bins.iter().enumerate() {
-            if !sample_bin(simd, bin, &self.slots[bin.slot], (x0, y), columns.clone(), layer) {
+            if !sample_bin(simd, bin, &self.slots[bin.slot], (x0, y), columns.clone(), lines, layer) {
                 continue;
             }
             let bin_weight = self.plan.bin_weight(k);

@@ -52,12 +52,13 @@ impl<S: Simd> LayerStack<S> {
         let covered = simd.min_f32s(layer[3], self.uncovered);
         let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
         let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
+        let (rest, covering) = (simd.sub_f32s(one, weight), simd.mul_f32s(covered, inverse));
+        let hindmost = simd.mul_f32s(weight, inverse);
         for p in 0..3 {
-            let straight = simd.mul_f32s(layer[p], inverse);
-            self.color[p] = fma(simd, straight, covered, self.color[p]);
-            self.hindmost[p] = fma(simd, simd.sub_f32s(straight, self.hindmost[p]), weight, self.hindmost[p]);
+            self.color[p] = fma(simd, layer[p], covering, self.color[p]);
+            self.hindmost[p] = fma(simd, layer[p], hindmost, simd.mul_f32s(self.hindmost[p], rest));
         }
-        self.known = fma(simd, simd.sub_f32s(one, self.known), weight, self.known);
+        self.known = fma(simd, self.known, rest, weight);
         self.uncovered = simd.sub_f32s(self.uncovered, covered);
     }
 
@@ -117,9 +118,13 @@ impl Layers {
     ) {
         let zero = simd.splat_f32s(0.0);
         for x in columns.step_by(S::F32_LANES) {
-            let light = match proximity.as_ref().and_then(|proximity| proximity.interpolate(x, S::F32_LANES)) {
-                Some(squares) => self.composite_near_silhouettes(simd, &squares, load::<S>(coc_px, x), x),
-                None => self.composite_one_surface(simd, load::<S>(coc_px, x), is_one_surface, x),
+            let coc_px = load::<S>(coc_px, x);
+            let light = match proximity {
+                Some(proximity) if proximity.any_inside(x, S::F32_LANES) => {
+                    let squares = proximity.interpolate(x, S::F32_LANES);
+                    self.composite_near_silhouettes(simd, &squares, coc_px, x)
+                }
+                _ => self.composite_one_surface(simd, coc_px, is_one_surface, x),
             };
             for p in 0..3 {
                 store::<S>(&mut color.0[p], x, simd.max_f32s(light[p], zero));
@@ -201,10 +206,16 @@ impl Layers {
         self.near += usize::from(bin.near);
     }
 
-    /// Whether the next layer covers all of a vector of pixels, or none of it; `None` if neither.
+    /// Whether there are none.
     #[inline(always)]
-    pub fn next_covers<S: Simd>(&self, simd: S, x: usize) -> Option<bool> {
-        let coverage = load::<S>(&self.planes[self.count].0[3], x);
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Whether the first layer covers all of a vector of pixels, or none of it; `None` if neither.
+    #[inline(always)]
+    pub fn front_covers<S: Simd>(&self, simd: S, x: usize) -> Option<bool> {
+        let coverage = load::<S>(&self.planes[0].0[3], x);
         let first = |mask| simd.first_true_m32s(mask) == S::F32_LANES;
         match first(simd.less_than_f32s(coverage, simd.splat_f32s(1.0 - 1e-5))) {
             true => Some(true),

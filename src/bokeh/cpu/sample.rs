@@ -15,6 +15,9 @@ use crate::bokeh::plan::{Bin, BinWeight};
 use crate::compute::aligned::CacheAligned;
 use crate::compute::simd::{fma, load, madd, store};
 
+/// Scratch memory: a row of a bin across a chunk at the finest reduced scale, and columns on both sides.
+pub type SampledLines = CacheAligned<[[f32; CHUNK / 2 + 4 * COPY_WIDTH]; 4]>;
+
 /// Reads some `columns` of a chunk of a bin, and the others of their tiles, at the picture's scale with linear
 /// interpolation. Returns false if they are empty.
 #[inline(always)]
@@ -24,6 +27,7 @@ pub fn sample_bin<S: Simd>(
     slot: &Slot,
     (x0, y): (usize, usize),
     columns: Range<usize>,
+    lines: &mut SampledLines,
     out: &mut [[f32; CHUNK]; 4],
 ) -> bool {
     if !slot.present {
@@ -40,10 +44,10 @@ pub fn sample_bin<S: Simd>(
     let (rows, tiles) =
         ((above, below, fraction), columns.start - columns.start % TILE_W..columns.end.next_multiple_of(TILE_W));
     match bin.scale {
-        1 => upsample::<S, 1>(simd, slot, bin.height, rows, x0, tiles, out),
-        2 => upsample::<S, 2>(simd, slot, bin.height, rows, x0, tiles, out),
-        4 => upsample::<S, 4>(simd, slot, bin.height, rows, x0, tiles, out),
-        _ => upsample::<S, 8>(simd, slot, bin.height, rows, x0, tiles, out),
+        1 => upsample::<S, 1>(simd, slot, bin.height, rows, x0, tiles, lines, out),
+        2 => upsample::<S, 2>(simd, slot, bin.height, rows, x0, tiles, lines, out),
+        4 => upsample::<S, 4>(simd, slot, bin.height, rows, x0, tiles, lines, out),
+        _ => upsample::<S, 8>(simd, slot, bin.height, rows, x0, tiles, lines, out),
     }
     true
 }
@@ -58,6 +62,7 @@ fn upsample<S: Simd, const N: usize>(
     (above, below, fraction): (usize, usize, f32),
     x0: usize,
     columns: Range<usize>,
+    lines: &mut SampledLines,
     out: &mut [[f32; CHUNK]; 4],
 ) {
     let (width, fraction) = (slot.source.across * STRIP, simd.splat_f32s(fraction));
@@ -78,7 +83,6 @@ fn upsample<S: Simd, const N: usize>(
     // One column more on both sides than the tiles cover.
     let start = first.saturating_sub(1) / COPY_WIDTH * COPY_WIDTH;
     let count = (end + 1).min(width) - start;
-    let mut lines = CacheAligned([[0.0; CHUNK / 2 + 4 * COPY_WIDTH]; 4]);
     for (p, line) in lines.0.iter_mut().enumerate() {
         for x in (0..count).step_by(COPY_WIDTH) {
             let (a, b) = (piece(start + x, above, p), piece(start + x, below, p));

@@ -99,7 +99,7 @@ impl Silhouettes {
             (columns.start / SILHOUETTE_CELL).saturating_sub(1)..(columns.end / SILHOUETTE_CELL + 1).min(self.across);
         rows.any(|row| {
             let line = &self.dilated[row * DISTANCES_PER_CELL * self.across..][..self.across];
-            line[columns.clone()].iter().any(|&square| square > 0.0)
+            maximum(&line[columns.clone()]) > 0.0
         })
     }
 
@@ -110,21 +110,19 @@ impl Silhouettes {
         let along = ((y as f32 + 0.5) / SILHOUETTE_CELL as f32 - 0.5).max(0.0);
         let above = (along as usize).min(self.down - 1);
         let below = (above + 1).min(self.down - 1);
+        let (first, before) = (x0 / SILHOUETTE_CELL, usize::from(x0 == 0));
+        let cells = first + before - 1..(first + CHUNK_CELLS - 1).min(self.across);
         let mut proximity = Proximity([[0.0; CHUNK_CELLS]; 2]);
         for (plane, line) in proximity.0.iter_mut().enumerate() {
-            let row = |row: usize| &self.dilated[(row * DISTANCES_PER_CELL + plane) * self.across..][..self.across];
-            let (above, below, first) = (row(above), row(below), x0 / SILHOUETTE_CELL);
-            if first > 0 && first + CHUNK_CELLS <= self.across {
-                let (above, below) = (&above[first - 1..][..CHUNK_CELLS], &below[first - 1..][..CHUNK_CELLS]);
-                for k in 0..CHUNK_CELLS {
-                    line[k] = above[k] + along.fract() * (below[k] - above[k]);
-                }
-            } else {
-                for (k, value) in line.iter_mut().enumerate() {
-                    let x = (first + k).saturating_sub(1).min(self.across - 1);
-                    *value = above[x] + along.fract() * (below[x] - above[x]);
-                }
+            let row = |row: usize| &self.dilated[(row * DISTANCES_PER_CELL + plane) * self.across..][cells.clone()];
+            let inside = &mut line[before..][..cells.len()];
+            for ((value, above), below) in inside.iter_mut().zip(row(above)).zip(row(below)) {
+                *value = above + along.fract() * (below - above);
             }
+            // Beyond the picture its outermost cells repeat.
+            let (first, last) = (inside[0], inside[cells.len() - 1]);
+            line[..before].fill(first);
+            line[before + cells.len()..].fill(last);
         }
         (maximum(&proximity.0[0]) > 0.0).then_some(proximity)
     }
@@ -148,14 +146,15 @@ const MAX_LANES: usize = 16;
 pub struct Proximity([[f32; CHUNK_CELLS]; 2]);
 
 impl Proximity {
-    /// Returns the values of some pixels from column `x` of the chunk on, linear between the centres of cells; `None`
-    /// if all are outside.
+    /// Whether any of some pixels from column `x` of the chunk on may be inside.
     #[inline(always)]
-    pub fn interpolate(&self, x: usize, count: usize) -> Option<[[f32; MAX_LANES]; 2]> {
-        let cells = &self.0[0][x / SILHOUETTE_CELL..][..count / SILHOUETTE_CELL + 2];
-        if cells.iter().all(|&square| square <= 0.0) {
-            return None;
-        }
+    pub fn any_inside(&self, x: usize, count: usize) -> bool {
+        self.0[0][x / SILHOUETTE_CELL..][..count / SILHOUETTE_CELL + 2].iter().any(|&square| square > 0.0)
+    }
+
+    /// Returns the values of some pixels from column `x` of the chunk on, linear between the centres of cells.
+    #[inline(always)]
+    pub fn interpolate(&self, x: usize, count: usize) -> [[f32; MAX_LANES]; 2] {
         let mut pixels = [[0.0; MAX_LANES]; 2];
         for (pixels, line) in pixels.iter_mut().zip(&self.0) {
             let line = &line[x / SILHOUETTE_CELL..];
@@ -167,7 +166,7 @@ impl Proximity {
                 }
             }
         }
-        Some(pixels)
+        pixels
     }
 }
 
