@@ -62,7 +62,8 @@ fn store_result(k: u32, pixel: vec2<u32>, corner: Corner, own: vec4<f32>) {
     if work.last == 1u && frame.compositing != 2u {
         let low = mix(interpolate_edge(corner, 0u), interpolate_edge(corner, 2u), corner.along).yzw;
         let high = mix(interpolate_edge(corner, 1u), interpolate_edge(corner, 3u), corner.along).xyz;
-        sum.a = clamp(sum.a, 0.0, 1.0);
+        // A whole bin covers everything, to which halves do not quite sum.
+        sum.a = select(clamp(sum.a, 0.0, 1.0), 1.0, bins[k].whole == 1u);
         sum = vec4(min(max(sum.rgb, low * sum.a), high * sum.a), sum.a);
     }
     blurred[at] = pack_half4(sum);

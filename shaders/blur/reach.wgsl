@@ -27,7 +27,7 @@ fn cell_weight(k: u32, distance: u32) -> f32 {
     return exp(-0.5 * d * d) + MIN_CELL_WEIGHT;
 }
 
-// The radius that blurs as much at the bin's scale as `coc_px` does at full size (plan.rs has the derivation).
+// The radius that blurs as much at the bin's scale as `coc_px` does at full size (bank/reduced.rs has the derivation).
 fn bin_radius_px(k: u32, coc_px: f32) -> f32 {
     var radius_px = coc_px;
     if bins[k].scale > 1u {
