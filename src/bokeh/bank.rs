@@ -111,38 +111,34 @@ impl FilterBank {
             vertical: vec![0.0; taps],
         };
         let reduced = ReducedTaps::new();
-        let mut lines = [vec![0.0; 2 * half_width + 1], vec![0.0; 2 * half_width + 1]];
+        let mut line = vec![0.0; 2 * half_width + 1];
         for node in 0..bank.node_half_width.len() {
             // At radius 0, tap 0 covers the whole profile.
             let radius_px = (f64::from(node_radius_px(node % nodes)) * mask.extent).max(1e-6);
             let reach = bank.node_half_width[node] as usize;
-            let mut total = 0.0;
+            let (first, mut total) = (bank.tap_index(node, -(reach as isize)), 0.0);
             for t in 0..terms {
-                for (line, profile) in lines.iter_mut().zip([&across[t], &down[t]]) {
+                let mut sums = [0.0; 2];
+                let tables = [&mut bank.horizontal, &mut bank.vertical];
+                for ((profile, table), sum) in [&across[t], &down[t]].into_iter().zip(tables).zip(&mut sums) {
                     let integral = |from: f64, to: f64| {
                         interpolate_cumulative(profile, to / radius_px)
                             - interpolate_cumulative(profile, from / radius_px)
                     };
-                    let line = &mut line[..2 * reach + 1];
-                    if node < nodes {
-                        for (j, tap) in line.iter_mut().enumerate() {
-                            let x = j as f64 - reach as f64;
-                            *tap = integral(x - 0.5, x + 0.5);
-                        }
-                    } else {
-                        reduced.sample(integral, line);
+                    match node < nodes {
+                        true => sample_pixels(integral, &mut line[..2 * reach + 1]),
+                        false => reduced.sample(integral, &mut line[..2 * reach + 1]),
+                    }
+                    for (tap, value) in table[first + t..].iter_mut().step_by(terms).zip(&line[..2 * reach + 1]) {
+                        *tap = *value as f32;
+                        *sum += value;
                     }
                 }
-                for j in 0..2 * reach + 1 {
-                    let at = bank.tap_index(node, j as isize - reach as isize) + t;
-                    (bank.horizontal[at], bank.vertical[at]) = (lines[0][j] as f32, lines[1][j] as f32);
-                }
-                let [across, down] = lines.each_ref().map(|line| line[..2 * reach + 1].iter().sum::<f64>());
-                total += across * down;
+                total += sums[0] * sums[1];
             }
             // What is cut off beyond the last tap is spread over all.
-            let row = bank.tap_index(node, -(half_width as isize))..bank.tap_index(node + 1, -(half_width as isize));
-            bank.vertical[row].iter_mut().for_each(|tap| *tap = (f64::from(*tap) / total) as f32);
+            let taps = &mut bank.vertical[first..][..(2 * reach + 1) * terms];
+            taps.iter_mut().for_each(|tap| *tap = (f64::from(*tap) / total) as f32);
         }
         bank
     }
@@ -183,6 +179,15 @@ impl FilterBank {
             .map(|(x, y)| (0..self.terms).map(|t| at(&self.horizontal, x, t) * at(&self.vertical, y, t)).sum::<f64>())
             .map(|tap| tap as f32)
             .collect()
+    }
+}
+
+/// Fills `taps` of full scale, centred on 0, from the `integral` of a profile between two places, in pixels.
+fn sample_pixels(integral: impl Fn(f64, f64) -> f64, taps: &mut [f64]) {
+    let reach = (taps.len() / 2) as f64;
+    for (j, tap) in taps.iter_mut().enumerate() {
+        let x = j as f64 - reach;
+        *tap = integral(x - 0.5, x + 0.5);
     }
 }
 

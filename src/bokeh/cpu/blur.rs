@@ -39,8 +39,6 @@ pub struct Strip<'a> {
     /// Radius and range of colours, from `reach`.
     pub edges: &'a SegmentEdges,
     pub bank: &'a FilterBank,
-    /// Largest radius of the bin, in bin pixels.
-    pub max_radius_px: f32,
     /// Whether the bin covers every pixel.
     pub whole: bool,
     /// Whether the aperture is rotated by 180 degrees (content in front of the focal plane).

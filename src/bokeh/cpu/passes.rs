@@ -170,7 +170,6 @@ impl CpuBokeh {
                 cells: strip_part.cells,
                 edges: strip_part.edges,
                 bank: &plan.bank,
-                max_radius_px: bin.max_radius_px,
                 whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
                 half_width: plan.bin_half_width(bin),

@@ -44,10 +44,10 @@ pub fn sample_bin<S: Simd>(
     let (rows, tiles) =
         ((above, below, fraction), columns.start - columns.start % TILE_W..columns.end.next_multiple_of(TILE_W));
     match bin.scale {
-        1 => upsample::<S, 1>(simd, slot, bin.height, rows, x0, tiles, lines, out),
-        2 => upsample::<S, 2>(simd, slot, bin.height, rows, x0, tiles, lines, out),
-        4 => upsample::<S, 4>(simd, slot, bin.height, rows, x0, tiles, lines, out),
-        _ => upsample::<S, 8>(simd, slot, bin.height, rows, x0, tiles, lines, out),
+        1 => upsample::<S, 1>(simd, (slot, bin.height), rows, x0, tiles, lines, out),
+        2 => upsample::<S, 2>(simd, (slot, bin.height), rows, x0, tiles, lines, out),
+        4 => upsample::<S, 4>(simd, (slot, bin.height), rows, x0, tiles, lines, out),
+        _ => upsample::<S, 8>(simd, (slot, bin.height), rows, x0, tiles, lines, out),
     }
     true
 }
@@ -57,8 +57,7 @@ pub fn sample_bin<S: Simd>(
 #[inline(always)]
 fn upsample<S: Simd, const N: usize>(
     simd: S,
-    slot: &Slot,
-    height: usize,
+    (slot, height): (&Slot, usize),
     (above, below, fraction): (usize, usize, f32),
     x0: usize,
     columns: Range<usize>,

@@ -200,7 +200,7 @@ impl Samples {
             let (own, is_hiding, is_open) = known.classify_pixel(metres[k], rounds[k], inverse[k]);
             let is_seen = (rounds[k] >= SURE) & ((own - inverse[k]).abs() <= known.surface_step);
             let is_unsettled = u32::from(!is_seen) & (is_hiding ^ 1);
-            flags[k] |= HIDING * is_hiding | OPEN * is_open | UNSETTLED * is_unsettled;
+            flags[k] |= (HIDING * is_hiding) | (OPEN * is_open) | (UNSETTLED * is_unsettled);
             nearest[k] = nearest[k].max(own.to_bits());
             farthest[k] = farthest[k].min(own.to_bits());
         }

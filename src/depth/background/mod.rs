@@ -86,8 +86,11 @@ pub struct BackgroundMemory {
     /// Whether the cells are those of the current map.
     is_classified: bool,
     /// The revealed pixels of each band, and scratch.
-    pixels: Vec<(Vec<MixedPixel>, Vec<(usize, u32)>)>,
+    pixels: Vec<BandPixels>,
 }
+
+/// Revealed pixels of a band, and scratch.
+type BandPixels = (Vec<MixedPixel>, Vec<(usize, u32)>);
 
 impl Default for BackgroundMemory {
     fn default() -> Self {
