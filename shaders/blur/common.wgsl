@@ -61,6 +61,7 @@ struct Frame {
     term_stride: u32,           // pixels of a batch: stride between the rows of two terms
     yuyv: u32,                  // 1: the result is YUYV
     front_px: f32,              // above this CoC nothing is in front of the subject
+    has_reduced: u32,           // 1: the bank has filters for reduced scales
 }
 
 // Parameters of a dispatch: some bins, of one layer if it goes over the picture.

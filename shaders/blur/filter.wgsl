@@ -52,7 +52,7 @@ fn find_taps(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     let left = nearest_node(radii.x, frame.steps_per_px, frame.nodes);
     let right = nearest_node(radii.y, frame.steps_per_px, frame.nodes);
     // The filters for reduced scales come after those for full scale.
-    let is_reduced = u32(bins[k].scale > 1u);
+    let is_reduced = select(0u, frame.has_reduced, bins[k].scale > 1u);
     let nodes = vec2(left, right) + is_reduced * frame.nodes;
     let origin = (nodes * (2u * frame.half_width + 1u) + frame.half_width) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);

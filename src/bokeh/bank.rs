@@ -161,10 +161,15 @@ impl FilterBank {
         round_to_node(radius_px).min(self.nodes - 1)
     }
 
+    /// Whether there are filters for reduced scales.
+    pub fn has_reduced(&self) -> bool {
+        self.node_half_width.len() > self.nodes
+    }
+
     /// Returns the first node of the filters for a scale.
     #[inline(always)]
     pub fn first_node(&self, scale: usize) -> usize {
-        if scale > 1 { self.nodes } else { 0 }
+        if scale > 1 && self.has_reduced() { self.nodes } else { 0 }
     }
 
     /// Returns the 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_half_width[node]`, row-major. With `turned`,

@@ -63,8 +63,8 @@ impl QualityLadder {
             };
             let bank = bank_keys.iter().position(|&key| key == (rank, bank_px)).unwrap_or_else(|| {
                 bank_keys.push((rank, bank_px));
-                // Gathers, and the bins of all terms up to a limit, are at full scale.
-                let with_reduced = compositing != Compositing::Gather && (rank != Rank::Full || bank_px < max_px);
+                // Gathers are at full scale. With all terms only large radii are not, beside which tents hardly blur.
+                let with_reduced = compositing != Compositing::Gather && rank != Rank::Full;
                 let ApertureFactors { svd, mask } = &*factors;
                 banks.push(Arc::new(FilterBank::from_decomposition(svd, mask, rank, bank_px, with_reduced)));
                 banks.len() - 1

@@ -116,7 +116,8 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             extent,
             term_stride,
             yuyv,
-            front_px
+            front_px,
+            has_reduced
         }),
         layout!(Bin {
             size,

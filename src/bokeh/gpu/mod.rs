@@ -151,7 +151,8 @@ impl GpuBokeh {
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
             yuyv: u32::from(job.yuyv.is_some()),
             front_px: front_px(plan.near_from_px()),
-            unused: [0; 2],
+            has_reduced: u32::from(plan.bank.has_reduced()),
+            unused: 0,
         }
     }
 }

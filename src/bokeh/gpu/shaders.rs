@@ -157,8 +157,9 @@ pub struct Frame {
     pub term_stride: u32,
     pub yuyv: u32,
     pub front_px: f32,
+    pub has_reduced: u32,
     /// Padding to the size of the uniform.
-    pub unused: [u32; 2],
+    pub unused: u32,
 }
 
 /// Uniform `Bin` of `common.wgsl`.
