@@ -19,6 +19,8 @@ const MIN_WEIGHT: f32 = 0.5;
 /// Variance of a background picture's light: noise, and half a pixel of shift.
 const NOISE: f32 = 2e-4;
 
+/// Columns of pixels from one sample of colour to the next.
+const STEP: usize = 2;
 /// Columns on both sides of a cell that are within [`RADIUS`], by distance in rows.
 const HALVES: [usize; RADIUS + 1] = {
     let (mut halves, mut row) = ([0; RADIUS + 1], 0);
@@ -193,7 +195,6 @@ impl Models {
     #[inline(always)]
     fn gather_colors(&mut self, view: &MaskView, cells: &[Cell], row: usize) {
         let Self { sums, columns, mask_row, .. } = self;
-        let step = view.cell_px / 2;
         let (cells, sums) = (&cells[row * view.across..], &mut sums[row * view.across..]);
         columns.iter().for_each(|&column| sums[column] = Sums::NONE);
         for y in view.pixel_rows(row) {
@@ -203,7 +204,7 @@ impl Models {
             let first = y * view.color.width as usize;
             view.interpolate_mask_row(y, mask_row);
             for &column in &*columns {
-                // Two pixels of a row suffice, in places that differ from row to row; of pure cells, of every other row.
+                // Of the pixels, one in two suffices; of pure cells, one in four.
                 let (pure, row) = match cells[column] {
                     Cell::Band => (None, y),
                     _ if y % 2 == 1 => continue,
@@ -211,7 +212,7 @@ impl Models {
                     Cell::Far => (Some(0.0), y / 2),
                 };
                 let (sums, xs) = (&mut sums[column], view.pixel_columns(column));
-                for x in (xs.start + row % step..xs.end).step_by(step) {
+                for x in (xs.start + row % STEP..xs.end).step_by(STEP) {
                     let light = view.light_at(first + x);
                     match pure.unwrap_or_else(|| view.mask_at(mask_row, x)) {
                         alpha if alpha > SURE => sums.add(NEAR, light),
@@ -221,10 +222,9 @@ impl Models {
                 }
             }
         }
-        // The weight of each is that of the pixels it stands for, where half of a cell's count.
-        for &column in &*columns {
-            let weight = if cells[column] == Cell::Band { 0.5 } else { 1.0 } * step as f32;
-            sums[column].0.iter_mut().for_each(|sum| *sum *= weight);
+        // These count twice.
+        for &column in columns.iter().filter(|column| cells[**column] != Cell::Band) {
+            sums[column].0.iter_mut().for_each(|sum| *sum *= 2.0);
         }
     }
 
