@@ -153,7 +153,8 @@ impl DepthCoc {
         let ratio = if near > far { near } else { far };
         let coc_px = self.coc_at_infinity_px * (1.0 - ratio);
         let max_px = self.max_coc_px;
-        let coc_px = if coc_px < -max_px { -max_px } else { coc_px };
+        // So that without a blur the smallest depths, whose inverse is infinite, are near, too, and not NaN.
+        let coc_px = if coc_px > -max_px { coc_px } else { -max_px };
         if coc_px > max_px { max_px } else { coc_px }
     }
 }
