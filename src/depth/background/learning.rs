@@ -90,10 +90,9 @@ impl WithSimd for UpdateRows<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { view, rows, rgb, inverse, rounds } = self;
         let (width, first) = (view.size.0, rows.start);
-        let round = view.update_index / ROWS;
-        let fades = round.is_multiple_of(FADE_ROUNDS);
+        let fades = view.fades();
         for y in rows.filter(|y| y % ROWS == view.update_index % ROWS) {
-            let refreshes = (round + y).is_multiple_of(REFRESH_ROUNDS);
+            let refreshes = view.refreshes(y);
             for begin in (0..width).step_by(BLOCK) {
                 let count = (width - begin).min(BLOCK);
                 // Most of the picture is well known, or hidden.
@@ -114,6 +113,20 @@ impl WithSimd for UpdateRows<'_> {
 }
 
 impl UpdateInput<'_> {
+    fn round(&self) -> usize {
+        self.update_index / ROWS
+    }
+
+    /// Whether what is hidden fades in this round.
+    fn fades(&self) -> bool {
+        self.round().is_multiple_of(FADE_ROUNDS)
+    }
+
+    /// Whether the well-known colours of row `y` are updated in this round.
+    fn refreshes(&self, y: usize) -> bool {
+        (self.round() + y).is_multiple_of(REFRESH_ROUNDS)
+    }
+
     /// Updates a block that begins at a pixel.
     #[inline(always)]
     fn update_block(
@@ -126,8 +139,7 @@ impl UpdateInput<'_> {
     ) {
         let (surface_step, at) = (self.surface_step, y * self.size.0 + begin);
         let (inverse, rounds) = (&mut inverse[..count], &mut rounds[..count]);
-        let round = self.update_index / ROWS;
-        let (fades, refreshes) = (round.is_multiple_of(FADE_ROUNDS), (round + y).is_multiple_of(REFRESH_ROUNDS));
+        let (fades, refreshes) = (self.fades(), self.refreshes(y));
         let (mut own, mut steps) = ([0.0; BLOCK], [0.0; BLOCK]);
         let metres = &self.map.metres[at..][..count];
         let (mut seen, mut is_hidden, mut is_sure) = ([0u32; BLOCK], [false; BLOCK], [true; BLOCK]);
@@ -154,7 +166,7 @@ impl UpdateInput<'_> {
             }
         }
         // The rounding offset rotates, so that rounding errors average out.
-        let turn = i32::from(round as i16) % MEMORY;
+        let turn = i32::from(self.round() as i16) % MEMORY;
         for k in 0..count {
             let apart = [now[0][k] - kept[0][k], now[1][k] - kept[1][k], now[2][k] - kept[2][k]];
             let is_alike = (apart[0].abs() <= CHANGED) & (apart[1].abs() <= CHANGED) & (apart[2].abs() <= CHANGED);
