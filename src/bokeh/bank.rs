@@ -84,10 +84,9 @@ impl FilterBank {
         };
         let across: Vec<_> = (0..terms).map(|t| cumulate(&svd.v[t * n..][..n])).collect();
         let mut down: Vec<_> = (0..terms).map(|t| cumulate(&svd.u[t * n..][..n])).collect();
-        // The vertical taps include the singular values and the normalisation of all taps to sum 1.
-        let total: f64 = (0..terms).map(|t| svd.sigma[t] * across[t][n] * down[t][n]).sum();
-        for (t, profile) in down.iter_mut().enumerate() {
-            profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
+        // The vertical taps include the singular values.
+        for (profile, sigma) in down.iter_mut().zip(&svd.sigma) {
+            profile.iter_mut().for_each(|x| *x *= sigma);
         }
 
         let nodes = count_nodes(max_radius_px.max(0.0));
@@ -136,7 +135,7 @@ impl FilterBank {
                 }
                 total += sums[0] * sums[1];
             }
-            // What is cut off beyond the last tap is spread over all.
+            // All taps sum to 1; what is cut off beyond the last one is spread over them.
             let taps = &mut bank.vertical[first..][..(2 * reach + 1) * terms];
             taps.iter_mut().for_each(|tap| *tap = (f64::from(*tap) / total) as f32);
         }

@@ -9,6 +9,7 @@ use crate::compute::simd::madd;
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
+
 /// Encodes linear light as codes.
 pub struct Encoder {
     /// Tone curves of 16-bit codes; `None` is sRGB.
