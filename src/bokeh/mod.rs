@@ -107,6 +107,9 @@ pub struct Settings {
     /// Whether what is behind is steadied: noise is averaged over frames. These must then be those of one stream, in
     /// order.
     pub reuse: bool,
+    /// Whether nothing behind the focal plane is represented finer than cells of half its radius, so that no filter can
+    /// undo its blur.
+    pub privacy: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
     /// Largest CoC radius in front of the focal plane, in pixels; 0 if nothing can be there.

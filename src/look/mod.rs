@@ -183,6 +183,7 @@ impl Look {
             quality: self.quality.unwrap_or_default(),
             adaptive: adaptive && self.quality.is_none(),
             reuse: self.reuse.is_on(adaptive),
+            privacy: false,
             far_max_px,
             near_max_px,
         })

@@ -43,6 +43,7 @@ fn compare_with_cpu(device: &Arc<Device>) -> Result<SelfTest, BokehError> {
         quality: Quality::default(),
         adaptive: false,
         reuse: false,
+        privacy: false,
         far_max_px: RADIUS_PX,
         near_max_px: RADIUS_PX,
     };

@@ -14,6 +14,7 @@ fn settings(coc: CocKind, quality: Quality) -> Settings {
         quality,
         adaptive: false,
         reuse: false,
+        privacy: false,
         far_max_px: 16.0,
         near_max_px: 30.0,
     }
