@@ -83,6 +83,7 @@ pub fn settings(coc: CocKind) -> Settings {
         quality: Quality::Balanced,
         adaptive: false,
         reuse: false,
+        privacy: false,
         far_max_px: 12.0,
         near_max_px: if coc == CocKind::Depth { 18.0 } else { 0.0 },
     }

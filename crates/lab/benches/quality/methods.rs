@@ -158,6 +158,7 @@ impl Blurrer {
             quality,
             adaptive: false,
             reuse: false,
+            privacy: false,
             far_max_px: shot.lens.coc_at_infinity_px,
             near_max_px: shot.lens.max_coc_px,
         };

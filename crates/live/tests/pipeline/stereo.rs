@@ -167,6 +167,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
         quality: Quality::High,
         adaptive: false,
         reuse: false,
+        privacy: false,
         far_max_px: 8.0,
         near_max_px: 16.0,
     };

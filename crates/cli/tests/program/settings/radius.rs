@@ -63,6 +63,7 @@ fn the_library_refuses_what_the_command_line_does() {
         quality: Quality::Balanced,
         adaptive: false,
         reuse: false,
+        privacy: false,
         far_max_px: radius_px,
         near_max_px: 0.0,
     };
