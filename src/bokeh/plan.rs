@@ -14,11 +14,14 @@
 
 mod band;
 mod filters;
+mod privacy;
 mod slots;
 
 use std::sync::Arc;
 
 use band::BandRows;
+pub use privacy::CELL_SHARPNESS;
+use privacy::decimate;
 
 use super::bank::{FilterBank, compensated_radius_px};
 pub use super::bin_weight::BinWeight;
@@ -64,6 +67,9 @@ pub struct Bin {
     pub high_px: f32,
     /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::quality_level::SCALES`].
     pub scale: usize,
+    /// Side of the cells, in bin pixels, to which its colours are averaged before they are filtered
+    /// ([`Settings::privacy`]); 1 if it is not.
+    pub decimation: usize,
     /// Columns of the bin's picture.
     pub width: usize,
     pub height: usize,
@@ -108,6 +114,8 @@ pub struct Plan {
     pub exact: bool,
     /// Whether what is behind is steadied ([`Settings::reuse`]).
     pub reuse: bool,
+    /// Whether what is behind is decimated ([`Settings::privacy`]).
+    pub privacy: bool,
     /// Set if this is the plan of a band of a larger picture ([`Plan::for_band`]).
     band: Option<BandRows>,
     coc: CocKind,
@@ -148,6 +156,7 @@ impl Plan {
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
             reuse: settings.reuse,
+            privacy: settings.privacy,
             ladder,
             band: None,
             coc: settings.coc,
@@ -236,6 +245,7 @@ impl Plan {
     fn create_bins(&mut self) {
         let [far, near] = &self.ranges;
         let per_side = self.ladder.max_bins_per_side();
+        let (decimates, height) = (self.privacy && self.compositing != Compositing::Gather, self.height);
         let inner_px = |ranges: &[CocRange]| ranges.first().map_or(f32::INFINITY, |range| range.border_px);
         let outer_px = |ranges: &[CocRange], k: usize| ranges.get(k + 1).map_or(f32::INFINITY, |range| range.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
@@ -244,10 +254,13 @@ impl Plan {
                 _ if self.full_scale => scale_within(content.1, MAX_FULL_RADIUS_PX),
                 _ => self.level.scale(content.0, content.1),
             };
+            let is_decimated = decimates && slot > 0 && high_px > 0.0;
+            let (scale, decimation) = if is_decimated { decimate(content, scale, height) } else { (scale, 1) };
             Bin {
                 low_px,
                 high_px,
                 scale,
+                decimation,
                 width: self.width.div_ceil(scale),
                 height: self.height.div_ceil(scale),
                 max_radius_px: compensated_radius_px(content.1, scale).min(self.bank.max_radius_px()),

@@ -119,7 +119,7 @@ impl BandedBokeh {
         let mut result = Vec::new();
         for (rows, around) in split_into_bands(height, rows, self.plan.support_rows()) {
             let wanted = rows.start - around.start..rows.end - around.start;
-            let plan = self.plan.for_band(around.len(), wanted.clone());
+            let plan = self.plan.for_band(around.clone(), wanted.clone());
             // Bands are as high as others but for the last one, and share an executor.
             let executor = match &mut executor {
                 Some(executor) if executor.plan.height == plan.height => {

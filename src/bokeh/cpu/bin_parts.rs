@@ -2,6 +2,7 @@
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
 use super::bin::BinRows;
+use super::decimate::Decimated;
 use super::rows::{CELL_PLANES, CellGrid, STRIP_CELLS, STRIP_ROW, SegmentEdges, Slot, Strips};
 use super::tiles::BLOCK;
 use crate::bokeh::ladder::Compositing;
@@ -69,6 +70,8 @@ pub struct StripParts<'a> {
     /// Number of the part that does its first strip.
     pub first: usize,
     pub source: &'a Strips,
+    /// Its colours decimated, if they are.
+    pub decimated: Option<&'a Decimated>,
     pub cells: &'a CellGrid,
     pub edges: &'a SegmentEdges,
     pub out: DisjointParts<'a, f32>,
@@ -84,6 +87,7 @@ impl<'a> StripParts<'a> {
         Self {
             first,
             source: &slot.source,
+            decimated: slot.decimated.as_ref().filter(|_| bin.decimation > 1),
             cells: &slot.cells,
             edges: &slot.edges,
             out: DisjointParts::new(&mut slot.out[..used], bin.height * STRIP_ROW, out_taken),

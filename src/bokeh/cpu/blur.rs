@@ -12,10 +12,13 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
+use super::decimate::Decimated;
 use super::filter::{
     BLOCK_ROWS, Taps, clamp_to_range, filter_column, filter_column_block, filter_row, max_row_len, row_len,
 };
-use super::rows::{COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips};
+use super::rows::{
+    COPY_WIDTH, CellGrid, EDGE_VALUES, STRIP, STRIP_EDGES, STRIP_ROW, SegmentEdges, Strips, max_pad,
+};
 use crate::bokeh::bank::FilterBank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
@@ -28,6 +31,8 @@ const TERMS_PER_GROUP: usize = 4;
 pub struct Strip<'a> {
     /// The bin's input; `out` and `active` are passed separately.
     pub source: &'a Strips,
+    /// Its colours decimated, if they are.
+    pub decimated: Option<&'a Decimated>,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
     /// Rows of the picture whose result is wanted.
@@ -78,7 +83,7 @@ impl Scratch {
         let half_width = plan.ladder.max_half_width();
         Self {
             rows: Aligned::zeros(ring_capacity(half_width) * max_row_len(TERMS_PER_GROUP.min(plan.ladder.max_terms()))),
-            lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * half_width.next_multiple_of(COPY_WIDTH))),
+            lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * max_pad(plan))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
             made: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -196,7 +201,11 @@ impl Strip<'_> {
         // All lines are copied first: unaligned loads right after the stores would stall on store forwarding.
         for (k, y) in ys.clone().enumerate() {
             if self.scratch.filtered[y / CELL] {
-                self.source.copy_line(self.strip, y, self.size.0, pad, &mut lines[k * 4 * span..][..4 * span]);
+                let line = &mut lines[k * 4 * span..][..4 * span];
+                self.source.copy_line(self.strip, y, self.size.0, pad, line);
+                if let Some(decimated) = self.decimated {
+                    decimated.recolor_line(simd, (self.strip, y), pad, line);
+                }
             }
         }
         for y in (ys.end..ys.end + BLOCK_ROWS).take_while(|&y| y < self.size.1) {

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::rows::{COPY_WIDTH, PlanarRows, STRIP, Strips, repeat_edges};
+use super::rows::{PlanarRows, STRIP, Strips, max_pad, repeat_edges};
 use super::unpack::{InputFrame, compute_coc_row};
 use crate::bokeh::bank::FilterBank;
 use crate::bokeh::plan::Plan;
@@ -42,7 +42,7 @@ impl Gather {
             } else {
                 Vec::new()
             },
-            source: PlanarRows::new(plan.width, plan.height, plan.ladder.max_half_width().next_multiple_of(COPY_WIDTH)),
+            source: PlanarRows::new(plan.width, plan.height, max_pad(plan)),
             coc: vec![0.0; pixels],
             rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.ladder.max_terms() }],
             result: vec![0.0; pixels * 3],

@@ -8,6 +8,7 @@ mod bin_store;
 mod blur;
 mod cell_sums;
 mod composite;
+mod decimate;
 mod directional;
 mod encode;
 mod enlarge;
@@ -36,6 +37,7 @@ use std::sync::atomic::AtomicBool;
 
 use band::{BandScratch, NO_BIN};
 use blur::Scratch;
+use decimate::DecimateScratch;
 use encode::Encoder;
 use gather::Gather;
 use pulp::Arch;
@@ -76,6 +78,7 @@ struct ThreadScratch {
     lanes: Vec<f32>,
     band: BandScratch,
     dilation: Vec<f32>,
+    decimate: DecimateScratch,
     blur: Scratch,
     composite: composite::CompositeScratch,
 }
@@ -95,6 +98,7 @@ impl CpuBokeh {
                 band: BandScratch::new(),
                 // The pass needs a grid and one row of it.
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
+                decimate: DecimateScratch::new(if plan.privacy { width } else { 0 }),
                 blur: Scratch::new(&plan),
                 composite: composite::CompositeScratch::new(),
             })
@@ -157,6 +161,10 @@ impl CpuBokeh {
         } else {
             self.dilate_radii();
             lap("reach")?;
+            if self.plan.privacy {
+                self.decimate_bins();
+                lap("decimate")?;
+            }
             self.blur_bins();
             lap("blur")?;
         }

@@ -141,6 +141,17 @@ impl CpuBokeh {
         });
     }
 
+    /// Pass `decimate`: bin by bin.
+    pub(super) fn decimate_bins(&mut self) {
+        for slot in self.slots.iter_mut().filter(|slot| slot.present) {
+            let bin = self.plan.bin_in_slot(slot.index).map(|k| &self.plan.bins[k]);
+            if let (Some(decimated), true) = (&mut slot.decimated, bin.is_some_and(|bin| bin.decimation > 1)) {
+                let threads = (&mut self.workers, &mut self.thread_scratch[..]);
+                decimated.run(&slot.source, threads, self.arch, &mut slot.taken[0]);
+            }
+        }
+    }
+
     /// Pass `blur`: each part is a strip. The strips of all bins are numbered consecutively, so that no thread idles.
     pub(super) fn blur_bins(&mut self) {
         let (plan, arch) = (&self.plan, self.arch);
@@ -164,6 +175,7 @@ impl CpuBokeh {
             let strip = part - strip_part.first;
             arch.dispatch(Strip {
                 source: strip_part.source,
+                decimated: strip_part.decimated,
                 size: (bin.width, bin.height),
                 wanted_px: plan.wanted_rows(),
                 scale: bin.scale,

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
+use super::decimate::Decimated;
 use super::tiles::BLOCK;
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
@@ -152,6 +153,11 @@ pub struct Strips {
 
 /// Columns that are copied at once.
 pub const COPY_WIDTH: usize = 16;
+/// Returns the columns beside a row that the filters of any level read, in whole pieces.
+pub fn max_pad(plan: &Plan) -> usize {
+    plan.ladder.max_half_width().next_multiple_of(COPY_WIDTH)
+}
+
 /// Values of a row of a strip.
 pub const STRIP_ROW: usize = 4 * STRIP;
 /// Values of a strip in a row of cells.
@@ -205,6 +211,8 @@ pub struct Slot {
     pub index: usize,
     /// Result of the pass `bin`.
     pub source: Strips,
+    /// Its colours decimated, if the plan asks for it.
+    pub decimated: Option<Decimated>,
     /// The coarse grid with the bin's coverage.
     pub cells: CellGrid,
     /// Per row of cells and block, whether `source` has any non-zero values.
@@ -246,6 +254,7 @@ impl Slot {
         Self {
             index: slot,
             source: Strips { data: Aligned::zeros(strips * rows_of_cells * STRIP_CELLS), across: 0 },
+            decimated: plan.privacy.then(|| Decimated::new(width, height, max_pad(plan))),
             filled: vec![false; plan.width.div_ceil(BLOCK) * rows_of_cells],
             edges: SegmentEdges::new(&cells),
             cells,
@@ -261,6 +270,9 @@ impl Slot {
 
     /// Takes the shape of a bin; if the scale changed, clears the used memory.
     pub fn reshape(&mut self, plan: &Plan, bin: &Bin) {
+        if let Some(decimated) = &mut self.decimated {
+            decimated.reshape(plan, bin);
+        }
         if self.scale == bin.scale {
             return;
         }

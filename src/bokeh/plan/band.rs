@@ -14,18 +14,20 @@ const INPAINTING_ROWS: usize = 256;
 pub(super) struct BandRows {
     /// Rows of the whole picture.
     of_picture: usize,
+    /// Number of the first row in the picture.
+    first: usize,
     /// The rows of the plan whose result is wanted; the others only contribute to it.
     wanted: Range<usize>,
 }
 
 impl Plan {
-    /// Returns the plan of `rows` rows of the picture, for the result of those that are `wanted`: its bins are those of
-    /// the last frame, and stay.
-    pub fn for_band(&self, rows: usize, wanted: Range<usize>) -> Self {
-        let band = BandRows { of_picture: self.height, wanted };
-        let mut plan = Self { height: rows, band: Some(band), ..self.clone() };
+    /// Returns the plan of some `rows` of the picture, for the result of those of them that are `wanted`: its bins are
+    /// those of the last frame, and stay.
+    pub fn for_band(&self, rows: Range<usize>, wanted: Range<usize>) -> Self {
+        let band = BandRows { of_picture: self.height, first: rows.start, wanted };
+        let mut plan = Self { height: rows.len(), band: Some(band), ..self.clone() };
         for bin in &mut plan.bins {
-            bin.height = rows.div_ceil(bin.scale);
+            bin.height = rows.len().div_ceil(bin.scale);
         }
         plan
     }
@@ -38,6 +40,11 @@ impl Plan {
     /// Returns the rows of the whole picture.
     pub(super) fn picture_rows(&self) -> usize {
         self.band.as_ref().map_or(self.height, |band| band.of_picture)
+    }
+
+    /// Returns the number of the first row in the whole picture.
+    pub(in crate::bokeh) fn first_row(&self) -> usize {
+        self.band.as_ref().map_or(0, |band| band.first)
     }
 
     /// Returns the rows whose result is wanted.

@@ -1,0 +1,30 @@
+//! How coarse the content of a bin is kept, so that no filter can undo its blur.
+
+use crate::bokeh::quality_level::SCALES;
+
+/// Smallest radius that hides text, in pixels of a picture of [`ROWS`] rows or fewer; in larger ones, in proportion.
+pub const MIN_PRIVATE_RADIUS_PX: f32 = 8.0;
+/// See [`MIN_PRIVATE_RADIUS_PX`].
+const ROWS: f32 = 720.0;
+/// Side of a cell in radii, at least: about half. A disc lets through finer detail, weakly enough not to be seen, but not
+/// to be recovered by an inverse filter.
+const CELL_RADII: f32 = 0.44;
+/// Largest scale in radii: the pixels of a bin are cells, too.
+const SCALE_RADII: f32 = 0.533;
+/// How much the colours of cells are sharpened, per neighbour: the two tents, down and up, blur by a third of a cell squared,
+/// and this takes as much away. It brings back no detail, as it only weights what the cells hold.
+pub const CELL_SHARPNESS: f32 = 1.0 / 6.0;
+
+/// Returns the scale of a bin that hides detail, at least `scale`, and the side of the cells, in pixels of the bin, to which
+/// its colours are averaged besides (1: they are not). Its content has radii from `low_px` to `high_px`, in a picture of
+/// `height` rows. If text is hidden by all of them, cells are at least as large as the smallest such radius.
+pub(super) fn decimate((low_px, high_px): (f32, f32), scale: usize, height: usize) -> (usize, usize) {
+    let coarser = SCALES.into_iter().rev().find(|&coarser| coarser as f32 <= SCALE_RADII * low_px);
+    let scale = coarser.map_or(scale, |coarser| coarser.max(scale));
+    let min_px = MIN_PRIVATE_RADIUS_PX * (height as f32 / ROWS).max(1.0);
+    if high_px < min_px {
+        return (scale, 1);
+    }
+    let floor_px = if low_px < min_px { 0.0 } else { min_px };
+    (scale, (floor_px.max(CELL_RADII * high_px) / scale as f32).ceil() as usize)
+}
