@@ -24,6 +24,7 @@ override ONE_ENDED_FACTOR: f32;     // length factor of a line with one end
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes are linear within each octave
 override OCTAVE_SHIFT: u32;         // right shift of a float that leaves its node in the octave
 override SPLINE_LEFT: f32;          // see src/bokeh/bank/reduced.rs
+override CELL_SHARPNESS: f32;       // how much averaged colours are sharpened, per neighbour
 override EXTRA_TAPS: u32;           // taps beyond the aperture in filters for reduced scales
 
 // Workgroup sizes, in pixels or elements of the pass: squares, lines, row tiles and result tiles of a bin.
@@ -81,7 +82,7 @@ struct Bin {
     cells: vec2<u32>,
     scale: u32,
     edges: u32,                 // segment edges across
-    turned: u32,
+    decimation: u32,            // side of the cells to which colours are averaged, in bin pixels; 1: they are not
     whole: u32,                 // 1: weight 1 for every pixel
     front: vec2<f32>,           // border to the bin in front: CoC, slope
     behind: vec2<f32>,

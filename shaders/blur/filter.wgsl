@@ -42,7 +42,7 @@ fn half_width_of_node(node: u32) -> i32 {
 
 fn find_taps(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     var radii = vec2(interpolate_edge(corner, 0u).x, interpolate_edge(corner, 2u).x);
-    var turned = bins[k].turned == 1u;
+    var turned = k < frame.near_bins;
     if frame.compositing == 2u {
         // The only bin of a gather has the picture's scale; every pixel has a radius of its own.
         let coc_px = unpack_scene(scene[pixel.y * frame.size.x + pixel.x], frame.max_px).w;

@@ -166,7 +166,7 @@ pub struct BlurredFrame {
 /// Selects an intermediate result of the last frame, read as vectors of four values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Probe {
-    /// After `bin`, per pixel of a bin: premultiplied r, g, b and coverage.
+    /// After `bin` and `decimate`, per pixel of a bin: premultiplied r, g, b and coverage.
     Bin(usize),
     /// After `reach`, two vectors per row of cells and segment edge: radius in bin pixels and lowest r, g, b; highest
     /// r, g, b and an unused value.

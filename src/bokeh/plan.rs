@@ -8,8 +8,9 @@
 //! 2. `bin`: each pixel times its weight in every bin, premultiplied, averaged down to the bin's scale.
 //! 3. `fill` (only with something in front): inpaints what near objects occlude, before the bins behind them are made.
 //! 4. `reach`: on a coarse grid, the local radius of each bin's content and the range of its colours.
-//! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
-//! 6. `composite`: front to back as disjoint coverage; the uncovered rest has the colour of the hindmost bin; back to
+//! 5. `decimate` (only with privacy, and where the bin's own pixels are finer): averages colours over larger cells.
+//! 6. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
+//! 7. `composite`: front to back as disjoint coverage; the uncovered rest has the colour of the hindmost bin; back to
 //!    8-bit sRGB.
 
 mod band;
@@ -87,6 +88,12 @@ impl Bin {
     /// Returns the standard deviation, in cells, of the neighbourhood over which a local radius is averaged.
     pub fn sigma_cells(&self) -> f32 {
         (self.max_radius_px / (2.0 * CELL as f32)).max(0.5)
+    }
+
+    /// Returns how far a pixel lies at most from those that its decimated colour depends on, in bin pixels: three cells, as
+    /// a cell averages two, is sharpened by its neighbours, and pixels lie between two.
+    pub fn decimation_reach(&self) -> usize {
+        if self.decimation > 1 { 3 * self.decimation } else { 0 }
     }
 }
 

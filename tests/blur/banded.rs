@@ -54,6 +54,11 @@ fn bands_are_the_whole_picture_to_the_bit() {
             assert!(whole == banded, "{kind:?} {quality}: {}", codes_apart(&whole, &banded));
         }
     }
+    for far_max_px in [12.0, 19.0, 40.0] {
+        let settings = Settings { privacy: true, far_max_px, ..settings(CocKind::Uniform) };
+        let [whole, banded] = both(&settings, &color, &map, &CocField::Uniform { radius_px: far_max_px });
+        assert!(whole == banded, "private, {far_max_px} px: {}", codes_apart(&whole, &banded));
+    }
     for rank in [None, Some(Rank::Full)] {
         let gather = Settings { method: Method::Gather, rank, ..settings(CocKind::Depth) };
         let [whole, banded] = both(&gather, &color, &map, &DOF);

@@ -14,6 +14,7 @@ mod laws;
 mod laws_random;
 mod occlusion;
 mod parity;
+mod privacy;
 mod shaders;
 mod shared_frame;
 mod slices;

@@ -16,7 +16,7 @@ use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
-use bokehcam::optics::{CocField, DepthCoc};
+use bokehcam::optics::{CocField, DepthCoc, Ramp};
 use common::{COC_KINDS, Numbers, coc, codes_apart, color, depth, noise, settings, shapes, three_depths};
 
 /// Limit of the difference of an 8-bit value, in codes: at most one in a thousand may exceed it, none may exceed its
@@ -108,6 +108,26 @@ fn every_effect_and_quality_agrees() {
         for quality in Quality::ALL {
             let settings = Settings { quality, ..settings(effect) };
             same(&settings, &image, &map, &coc(effect, 71), &format!("{effect:?} {quality}"));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn private_blurs_agree() {
+    let (image, map) = (noise(197, 141), three_depths(197, 141));
+    for effect in COC_KINDS {
+        for (quality, rank) in [(Quality::Draft, None), (Quality::Best, None), (Quality::Balanced, Some(Rank::Full))] {
+            // Cells of several pixels of a bin in some, and pixels of a bin as cells in others.
+            for far_max_px in [9.0, 16.0, 35.0] {
+                let settings = Settings { privacy: true, quality, rank, far_max_px, ..settings(effect) };
+                let field = match coc(effect, 141) {
+                    CocField::Uniform { .. } => CocField::Uniform { radius_px: far_max_px },
+                    CocField::Ramp(ramp) => CocField::Ramp(Ramp { max_px: far_max_px, ..ramp }),
+                    CocField::Depth(lens) => CocField::Depth(DepthCoc { coc_at_infinity_px: 1.4 * far_max_px, ..lens }),
+                };
+                same(&settings, &image, &map, &field, &format!("{effect:?} {quality} {rank:?} {far_max_px} px"));
+            }
         }
     }
 }

@@ -64,10 +64,10 @@ impl Cells {
     /// Returns the two cells between whose middles a bin pixel lies, and the weight of the second.
     #[inline(always)]
     fn around(self, pixel: usize) -> ([usize; 2], f32) {
-        let place = (2 * (pixel + self.phase) + 1) as f32 * (0.5 / self.size as f32) - 0.5;
-        let place = place.clamp(0.0, (self.count - 1) as f32);
-        let first = place as usize;
-        ([first, (first + 1).min(self.count - 1)], place - first as f32)
+        // From the middle of the first cell, in halves of a bin pixel: in integers, bands agree with the whole picture.
+        let halves = (2 * (pixel + self.phase) + 1).saturating_sub(self.size);
+        let (first, fraction) = (halves / (2 * self.size), (halves % (2 * self.size)) as f32 / (2 * self.size) as f32);
+        ([first, (first + 1).min(self.count - 1)], fraction)
     }
 }
 

@@ -1,7 +1,9 @@
 //! Read access to intermediate results, for comparing the executors pass by pass.
 
+use pulp::Scalar;
+
 use super::CpuBokeh;
-use super::rows::STRIP;
+use super::rows::{STRIP, STRIP_ROW};
 use super::tiles::{TILE_H, TILE_W};
 use crate::bokeh::Probe;
 
@@ -10,11 +12,20 @@ impl CpuBokeh {
     pub fn probe(&self, probe: Probe) -> Vec<[f32; 4]> {
         match probe {
             Probe::Bin(k) => {
-                let (bin, source) = (&self.plan.bins[k], &self.slots[self.plan.bins[k].slot].source);
-                let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
-                let at =
-                    |(x, y): (usize, usize)| std::array::from_fn(|p| source.row(x / STRIP, y)[p * STRIP + x % STRIP]);
-                (0..bin.height).flat_map(pixels).map(at).collect()
+                let (bin, slot) = (&self.plan.bins[k], &self.slots[self.plan.bins[k].slot]);
+                let mut row = [0.0; STRIP_ROW];
+                let mut pixels = vec![[0.0; 4]; bin.width * bin.height];
+                for (n, pixel) in pixels.iter_mut().enumerate() {
+                    let (x, y) = (n % bin.width, n / bin.width);
+                    if x % STRIP == 0 {
+                        row.copy_from_slice(slot.source.row(x / STRIP, y));
+                        if let Some(decimated) = slot.decimated_rows(bin) {
+                            decimated.recolor_line(Scalar::new(), (x / STRIP, y), 0, &mut row);
+                        }
+                    }
+                    *pixel = std::array::from_fn(|p| row[p * STRIP + x % STRIP]);
+                }
+                pixels
             }
             Probe::Reach(k) => self.slots[self.plan.bins[k].slot].edges.data.as_chunks::<4>().0.to_vec(),
             Probe::Blur(k) => {

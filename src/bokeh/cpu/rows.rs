@@ -244,6 +244,11 @@ impl Slot {
         self.active[strip * height.div_ceil(CELL) + y / CELL]
     }
 
+    /// Returns the decimated colours of a bin; `None` if it is not decimated.
+    pub fn decimated_rows(&self, bin: &Bin) -> Option<&Decimated> {
+        self.decimated.as_ref().filter(|_| bin.decimation > 1)
+    }
+
     /// Allocates zeros for the largest bin of the slot; the system provides pages only as frames touch them.
     pub fn new(plan: &Plan, slot: usize) -> Self {
         let scale = plan.min_scale(slot);

@@ -141,7 +141,7 @@ impl Layout {
                 cells: [cells_across as u32, down as u32],
                 scale: bin.scale as u32,
                 edges: edges as u32,
-                turned: u32::from(bin.near),
+                decimation: bin.decimation as u32,
                 whole: u32::from(plan.compositing != Compositing::Layers),
                 front: weight.front.into(),
                 behind: weight.behind.into(),

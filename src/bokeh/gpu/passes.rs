@@ -38,6 +38,8 @@ pub struct Passes {
     layers: Vec<Layer>,
     gather: Option<Pass>,
     reach: Pass,
+    /// Means of larger cells, and colours between them.
+    decimate: [Pass; 2],
     /// Per bank, the row and column pass of each batch of bins and group of terms.
     blur: Vec<Vec<[Pass; 2]>>,
     composite: Pass,
@@ -182,6 +184,10 @@ impl Passes {
             layers: (0..MAX_LAYERS).map(|index| builder.create_layer(index, picture)).collect(),
             gather,
             reach: builder.create_pass_over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
+            decimate: [
+                builder.create_pass_over_bins(shaders::DECIMATE, ALL, &[&b.grid, &b.source, &b.blurred]),
+                builder.create_pass_over_bins(shaders::INTERPOLATE, ALL, &[&b.grid, &b.blurred, &b.source]),
+            ],
             blur,
             composite: builder.create_pass(shaders::COMPOSITE, &[], &composite, lines),
             work: vec![0; work_count(plan) * UNIFORM_STRIDE as usize],
@@ -246,6 +252,7 @@ impl Passes {
             }
             let edges = layout.bins.iter().map(|bin| count_tiles([2 * bin.edges, bin.cells[1]], EDGES_TILE) as u32);
             recorder.record_workgroups(&self.reach, workgroups_2d(edges.sum()));
+            self.record_decimation(recorder, &layout.bins);
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
@@ -256,5 +263,19 @@ impl Passes {
             }
         }
         recorder.record(&self.composite);
+    }
+
+    /// Records the decimation of the bins that are decimated.
+    fn record_decimation(&self, recorder: &mut Recorder, bins: &[Bin]) {
+        let tiles = |size: &dyn Fn(&Bin) -> [u32; 2]| -> u32 {
+            let decimated = bins.iter().filter(|bin| bin.decimation > 1);
+            decimated.map(|bin| count_tiles(size(bin), [SMALL_TILE as usize; 2]) as u32).sum()
+        };
+        let [decimate, interpolate] = &self.decimate;
+        let means = tiles(&|bin| bin.size.map(|side| side.div_ceil(bin.decimation)));
+        if means > 0 {
+            recorder.record_workgroups(decimate, workgroups_2d(means));
+            recorder.record_workgroups(interpolate, workgroups_2d(tiles(&|bin| bin.size)));
+        }
     }
 }

@@ -8,7 +8,7 @@ use crate::bokeh::occlusion::{
     ONE_SURFACE_PX, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL, TRUSTED_STEPS,
 };
 use crate::bokeh::plan::{
-    CELL, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
+    CELL, CELL_SHARPNESS, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
 };
 use crate::bokeh::split::CROSS_FADE;
 use crate::compute::device::{Shader, shader};
@@ -25,6 +25,10 @@ pub const DILATE_COLUMNS: Shader = shader!(blur: "common"; "dilate_columns", "ce
 pub const BIN: Shader = shader!(blur: "common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!(blur: "common"; "reach", "work");
+/// Mean colours of larger cells.
+pub const DECIMATE: Shader = shader!(blur: "common"; "decimate", "means", "work");
+/// Colours between the middles of these cells.
+pub const INTERPOLATE: Shader = shader!(blur: "common"; "interpolate", "means", "work");
 pub const BLUR_ROWS: Shader = shader!(blur: "common"; "blur_rows", "filter", "node", "list", "tiles", "todo", "next");
 pub const BLUR_COLUMNS: Shader =
     shader!(blur: "common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
@@ -43,13 +47,15 @@ pub const FILL: Shader =
     shader!(blur: "common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
 pub const COMPOSITE: Shader = shader!(blur: "common"; "composite", "surfaces", "cells", "list", "yuyv");
 
-pub const ALL: [Shader; 15] = [
+pub const ALL: [Shader; 17] = [
     CLEAR,
     UNPACK,
     DILATE_ROWS,
     DILATE_COLUMNS,
     BIN,
     REACH,
+    DECIMATE,
+    INTERPOLATE,
     BLUR_ROWS,
     BLUR_COLUMNS,
     GATHER,
@@ -96,7 +102,7 @@ const fn pack_steps(axis: usize) -> f64 {
 }
 
 /// Values of the `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 33] = [
+pub const CONSTANTS: [(&str, f64); 34] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("UNBOUNDED_COLOR", UNBOUNDED_COLOR as f64),
@@ -121,6 +127,7 @@ pub const CONSTANTS: [(&str, f64); 33] = [
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("SPLINE_LEFT", SPLINE_LEFT as f64),
+    ("CELL_SHARPNESS", CELL_SHARPNESS as f64),
     ("EXTRA_TAPS", EXTRA_TAPS as f64),
     ("TILE", TILE as f64),
     ("SMALL_TILE", SMALL_TILE as f64),
@@ -171,7 +178,7 @@ pub struct Bin {
     pub cells: [u32; 2],
     pub scale: u32,
     pub edges: u32,
-    pub turned: u32,
+    pub decimation: u32,
     pub whole: u32,
     pub front: [f32; 2],
     pub behind: [f32; 2],

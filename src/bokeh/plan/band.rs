@@ -61,7 +61,7 @@ impl Plan {
 
     fn bin_support_rows(&self, bin: &Bin) -> usize {
         // A filtered row, and each row that it reads, takes its radius from cells; one more of each is interpolated.
-        (self.bin_half_width(bin) + (self.radius_cells(bin) + 3) * CELL) * bin.scale
+        (self.bin_half_width(bin) + bin.decimation_reach() + (self.radius_cells(bin) + 3) * CELL) * bin.scale
     }
 
     /// Returns how many rows above and below a row of the picture can change its result, with the bins of the last
