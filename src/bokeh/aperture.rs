@@ -187,6 +187,15 @@ impl Mask {
         (cells().all(|(x, y)| same(at(x, y), at(n - 1 - x, y))), cells().all(|(x, y)| same(at(x, y), at(x, n - 1 - y))))
     }
 
+    /// Whether the middle, a quarter of the area, lets through less than half of what the brightest part does: a shape that
+    /// a coarse grid does not keep.
+    pub fn is_hollow(&self) -> bool {
+        let (quarter, n) = (self.size / 4, self.size);
+        let middle = (quarter..n - quarter).flat_map(|y| &self.values[y * n + quarter..(y + 1) * n - quarter]);
+        let brightest = self.values.iter().copied().fold(0.0, f64::max);
+        middle.sum::<f64>() < 0.5 * brightest * ((n - 2 * quarter) * (n - 2 * quarter)) as f64
+    }
+
     /// Returns the sum of all values.
     pub fn sum(&self) -> f64 {
         self.values.iter().sum()

@@ -43,6 +43,8 @@ pub struct FilterBank {
     pub nodes: usize,
     /// True if every profile is symmetric, so that taps at `-j` and `j` are equal.
     pub is_symmetric: bool,
+    /// Whether the aperture is hollow ([`Mask::is_hollow`]).
+    pub is_hollow: bool,
     /// Distance of the aperture's outermost point from the centre, in radii.
     pub extent: f64,
     /// Half-width of each node: its outermost tap.
@@ -104,6 +106,7 @@ impl FilterBank {
             half_width,
             nodes,
             is_symmetric: symmetry == (true, true),
+            is_hollow: mask.is_hollow(),
             extent: mask.extent,
             node_half_width,
             horizontal: vec![0.0; taps],
@@ -163,6 +166,11 @@ impl FilterBank {
     /// Whether there are filters for reduced scales.
     pub fn has_reduced(&self) -> bool {
         self.node_half_width.len() > self.nodes
+    }
+
+    /// Whether filters keep the aperture's shape at radii of two pixels of a reduced scale.
+    pub fn fits_coarse_scales(&self) -> bool {
+        self.has_reduced() && !self.is_hollow
     }
 
     /// Returns the first node of the filters for a scale.

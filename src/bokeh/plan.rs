@@ -252,7 +252,8 @@ impl Plan {
     fn create_bins(&mut self) {
         let [far, near] = &self.ranges;
         let per_side = self.ladder.max_bins_per_side();
-        let (decimates, height) = (self.privacy && self.compositing != Compositing::Gather, self.height);
+        let decimates = self.privacy && self.compositing != Compositing::Gather;
+        let (bank, height) = (Arc::clone(&self.bank), self.height);
         let inner_px = |ranges: &[CocRange]| ranges.first().map_or(f32::INFINITY, |range| range.border_px);
         let outer_px = |ranges: &[CocRange], k: usize| ranges.get(k + 1).map_or(f32::INFINITY, |range| range.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
@@ -262,7 +263,7 @@ impl Plan {
                 _ => self.level.scale(content.0, content.1),
             };
             let is_decimated = decimates && slot > 0 && high_px > 0.0;
-            let (scale, decimation) = if is_decimated { decimate(content, scale, height) } else { (scale, 1) };
+            let (scale, decimation) = if is_decimated { decimate(&bank, content, scale, height) } else { (scale, 1) };
             Bin {
                 low_px,
                 high_px,

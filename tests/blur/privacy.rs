@@ -45,14 +45,15 @@ fn waves_as_fine_as_a_cell_are_gone() {
         // Some periods fall on zeros of the disc's transfer: the sum over all counts.
         for step in 0..12 {
             let period_px = (0.4 * f64::from(radius_px)).max(6.4) * (1.0 + 0.03 * f64::from(step));
-            let light = |x: u32| 0.5 + 0.45 * (std::f64::consts::TAU * f64::from(x) / period_px).sin() as f32;
-            let code = |x: u32| (255.0 * linear_to_srgb(light(x))).round() as u8;
-            let image = color(480, 96, |x, _| [code(x); 3]);
+            let wave = |x: u32| (std::f64::consts::TAU * f64::from(x) / period_px).sin() as f32;
+            // Brighter from row to row, so that rounding to codes does not add up.
+            let light = |x: u32, y: u32| 0.45 + 0.1 * y as f32 / 96.0 + 0.4 * wave(x);
+            let image = color(480, 96, |x, y| [(255.0 * linear_to_srgb(light(x, y))).round() as u8; 3]);
             let [off, on] = both(&settings, &image, None, &CocField::Uniform { radius_px });
             kept += amplitude(&off, period_px, 96);
             private += amplitude(&on, period_px, 96);
         }
-        assert!(kept > 0.05, "{radius_px} px: {kept}");
+        assert!(kept > 0.02, "{radius_px} px: {kept}");
         assert!(private < 0.15 * kept, "{radius_px} px: {private} of {kept}");
     }
 }

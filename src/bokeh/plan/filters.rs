@@ -13,11 +13,12 @@ impl Plan {
         self.reuse && !bin.near && bin.scale > 1 && bin.min_radius_px >= MIN_STEADY_RADIUS_PX
     }
 
-    /// Whether a bin's filters overshoot visibly: those for reduced scales, and those of few terms. Small filters keep
+    /// Whether a bin's results overshoot visibly: those at reduced scales, of sharpened cells, and of few terms. Small filters keep
     /// nearly all of their terms: a symmetric kernel has `half_width + 1`, any other `2 half_width + 1`.
     pub fn has_overshoot(&self, bin: &Bin) -> bool {
         let half_width = self.bin_half_width(bin);
-        bin.scale > 1 || self.bank.terms < if self.bank.is_symmetric { half_width } else { 2 * half_width }
+        bin.scale.max(bin.decimation) > 1
+            || self.bank.terms < if self.bank.is_symmetric { half_width } else { 2 * half_width }
     }
 
     /// Returns the outermost tap of a bin's filters, in bin pixels.

@@ -1,5 +1,6 @@
 //! How coarse the content of a bin is kept, so that no filter can undo its blur.
 
+use crate::bokeh::bank::FilterBank;
 use crate::bokeh::quality_level::SCALES;
 
 /// Smallest radius that hides text, in pixels of a picture of [`ROWS`] rows or fewer; in larger ones, in proportion.
@@ -15,11 +16,17 @@ const SCALE_RADII: f32 = 0.533;
 /// and this takes as much away. It brings back no detail, as it only weights what the cells hold.
 pub const CELL_SHARPNESS: f32 = 1.0 / 6.0;
 
-/// Returns the scale of a bin that hides detail, at least `scale`, and the side of the cells, in pixels of the bin, to which
-/// its colours are averaged besides (1: they are not). Its content has radii from `low_px` to `high_px`, in a picture of
-/// `height` rows. If text is hidden by all of them, cells are at least as large as the smallest such radius.
-pub(super) fn decimate((low_px, high_px): (f32, f32), scale: usize, height: usize) -> (usize, usize) {
-    let coarser = SCALES.into_iter().rev().find(|&coarser| coarser as f32 <= SCALE_RADII * low_px);
+/// Returns the scale, at least `scale`, of a bin that hides detail in a picture of `height` rows, and the side of the cells,
+/// in pixels of the bin, to which its colours are averaged besides (1: they are not). Its content has radii from `low_px` to
+/// `high_px`. If text is hidden by all of them, cells are at least as large as the smallest such radius.
+pub(super) fn decimate(
+    bank: &FilterBank,
+    (low_px, high_px): (f32, f32),
+    scale: usize,
+    height: usize,
+) -> (usize, usize) {
+    let coarsest_px = if bank.fits_coarse_scales() { SCALE_RADII * low_px } else { 0.0 };
+    let coarser = SCALES.into_iter().rev().find(|&coarser| coarser as f32 <= coarsest_px);
     let scale = coarser.map_or(scale, |coarser| coarser.max(scale));
     let min_px = MIN_PRIVATE_RADIUS_PX * (height as f32 / ROWS).max(1.0);
     if high_px < min_px {

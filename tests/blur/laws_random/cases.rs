@@ -124,7 +124,7 @@ impl Random {
             quality: self.of(&Quality::ALL),
             adaptive: self.below(2) == 0,
             reuse: false,
-            privacy: self.below(3) == 0,
+            privacy: false,
             far_max_px,
             near_max_px,
         }
