@@ -35,6 +35,7 @@ def flags(settings):
     {"effect": "tilt-shift", "tilt": "0.6:0.1:10", "aperture": "heart"},
     {"effect": "blur", "coc_at_infinity": 9.5, "aperture": "star:5", "quality": "draft"},
     {"behind": "color:#00b140", "focus": 1.0},
+    {"privacy": "on", "coc_at_infinity": 3},
 ])
 def test_render_is_the_command_render(program, recordings, portrait, tmp_path, settings):
     depth = recordings / "portrait" / "depth" / "000000.png"

@@ -27,8 +27,13 @@ pub enum CocRule {
 pub enum CocAtInfinity {
     /// The same at every focus distance, in pixels.
     Px(f32),
-    /// The value of a real lens at each focus distance.
-    Lens(Lens),
+    /// The value of a real lens at each focus distance, at least `min_px`.
+    Lens {
+        /// The lens.
+        lens: Lens,
+        /// Smallest radius, in pixels.
+        min_px: f32,
+    },
     /// For relative depth: this much with the focus on the nearest point, in pixels, and less in proportion to the inverse
     /// depth of the focus, as with a lens far from its subject. The CoC is then this much times the difference of
     /// inverse depth to the focus, whatever that is.
@@ -41,7 +46,7 @@ impl CocAtInfinity {
     pub fn coc_field(self, focus_m: f32, range_m: f32, width_px: u32, max_coc_px: f32) -> CocField {
         let coc_at_infinity_px = match self {
             Self::Px(radius_px) => radius_px,
-            Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),
+            Self::Lens { lens, min_px } => lens.coc_at_infinity_px(focus_m, width_px).max(min_px),
             Self::Relative(radius_px) => radius_px * (DepthMap::SUBJECT_M / focus_m).min(1.0),
         };
         CocField::Depth(DepthCoc { coc_at_infinity_px, focus_m, range_m, max_coc_px })

@@ -13,6 +13,7 @@ mod follow;
 pub mod number;
 mod patch;
 pub mod presets;
+mod privacy;
 pub mod settings;
 mod source_depth;
 mod strength;
@@ -26,6 +27,7 @@ pub use effect::{BackgroundMemory, Effect, Refine, Reuse};
 pub use files::{FileReaders, register_readers};
 pub use follow::FramingZoom;
 pub use patch::Value;
+pub use privacy::{Privacy, SmallBlur};
 pub use settings::{Patch, SETTINGS};
 pub use source_depth::{LookFacts, Metres};
 pub use strength::Strength;
@@ -91,6 +93,10 @@ pub struct Look {
     pub quality: Option<Quality>,
     /// Whether a stream keeps what hardly changes from earlier frames.
     pub reuse: Reuse,
+    /// Whether the blur of what is behind cannot be undone.
+    pub privacy: Privacy,
+    /// Whether the pictures leave for a call ([`Look::for_source`]).
+    pub is_for_call: bool,
     /// Whether depth is relative ([`Look::for_source`]): then the strength is the radius for a difference of inverse depth
     /// from the nearest to the farthest point.
     pub is_depth_relative: bool,
@@ -118,6 +124,8 @@ impl Default for Look {
             highlights: 0.0,
             quality: None,
             reuse: Reuse::Auto,
+            privacy: Privacy::Auto,
+            is_for_call: false,
             is_depth_relative: false,
         }
     }
@@ -148,7 +156,8 @@ impl Look {
         };
         // Not `auto`, which becomes a uniform blur if depth is missing.
         let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
-        Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
+        let privacy = if self.is_private() { Privacy::On } else { self.privacy };
+        Self { effect, focus, privacy, quality: quality.or(self.quality), ..self.clone() }
     }
 
     /// Returns the look that reproduces the blur of one frame from its colours and its depth in a file, in which relative
@@ -171,7 +180,7 @@ impl Look {
     pub fn blur_settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
         let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
-        let far_max_px = self.coc_at_infinity_px(size).min(max_px);
+        let far_max_px = self.far_px(size);
         let near_max_px = if coc == CocKind::Depth { max_px } else { 0.0 };
         Some(bokeh::Settings {
             coc,
@@ -183,7 +192,7 @@ impl Look {
             quality: self.quality.unwrap_or_default(),
             adaptive: adaptive && self.quality.is_none(),
             reuse: self.reuse.is_on(adaptive),
-            privacy: false,
+            privacy: self.is_private(),
             far_max_px,
             near_max_px,
         })
@@ -191,8 +200,7 @@ impl Look {
 
     /// Returns the rule for the CoC of frames of `size` pixels.
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
-        let max_coc_px = self.max_coc_px(size);
-        let radius_px = self.coc_at_infinity_px(size).min(max_coc_px);
+        let (radius_px, max_coc_px) = (self.far_px(size), self.max_coc_px(size));
         match self.coc_kind() {
             None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
             Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px }),
@@ -200,7 +208,7 @@ impl Look {
             Some(CocKind::Depth) => CocRule::Depth {
                 focus: self.focus,
                 lens: match self.strength {
-                    Strength::Lens(lens) => CocAtInfinity::Lens(lens),
+                    Strength::Lens(lens) => CocAtInfinity::Lens { lens, min_px: self.min_far_px(size) },
                     _ if self.is_depth_relative => CocAtInfinity::Relative(self.coc_at_infinity_px(size)),
                     _ => CocAtInfinity::Px(self.coc_at_infinity_px(size)),
                 },
@@ -227,8 +235,22 @@ impl Look {
         }
     }
 
+    /// Returns the largest CoC radius behind the focal plane, in pixels.
+    fn far_px(&self, size: (u32, u32)) -> f32 {
+        self.asked_far_px(size).max(self.min_far_px(size))
+    }
+
+    /// Returns the same as it was asked for, before privacy raises it.
+    fn asked_far_px(&self, size: (u32, u32)) -> f32 {
+        self.asked_px_at_infinity(size).min(self.asked_max_px(size))
+    }
+
     /// Returns the CoC radius at infinity in pixels; infinite if it depends on a focus that is not known yet.
-    fn coc_at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
+    fn coc_at_infinity_px(&self, size: (u32, u32)) -> f32 {
+        self.asked_px_at_infinity(size).max(self.min_far_px(size))
+    }
+
+    fn asked_px_at_infinity(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
             (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
@@ -242,9 +264,13 @@ impl Look {
     /// Returns the largest CoC radius in pixels. An explicit strength holds even above the default limit, unless
     /// `--max-coc` is given as well.
     fn max_coc_px(&self, size: (u32, u32)) -> f32 {
+        self.asked_max_px(size).max(self.min_far_px(size))
+    }
+
+    fn asked_max_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.coc_at_infinity_px(size)),
+            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.asked_px_at_infinity(size)),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }

@@ -53,6 +53,7 @@ impl Patch {
             highlights: Some(look.highlights),
             quality: Some(look.quality.into()),
             reuse: Some(look.reuse),
+            privacy: Some(look.privacy),
         }
     }
 
@@ -156,7 +157,20 @@ impl Patch {
         macro_rules! set {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        set!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights, reuse);
+        set!(
+            effect,
+            method,
+            focus,
+            focus_range_m,
+            refine,
+            background_memory,
+            follow,
+            tilt,
+            rim,
+            highlights,
+            reuse,
+            privacy
+        );
         look.strength = self.merge_strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.value();

@@ -6,8 +6,8 @@ use std::str::FromStr;
 
 use super::number::{OrAuto, in_range_parser, parse_non_negative, parse_positive};
 use super::{
-    ApertureSetting, BackgroundMemory, BackgroundSetting, Effect, FramingZoom, Look, MAX_RADIUS_PX, Refine, Reuse,
-    Strength, Tilt,
+    ApertureSetting, BackgroundMemory, BackgroundSetting, Effect, FramingZoom, Look, MAX_RADIUS_PX, Privacy, Refine,
+    Reuse, Strength, Tilt,
 };
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
@@ -128,6 +128,8 @@ settings! {
     /// What is behind the subject: blur (the room), color:#RRGGBB, image:FILE, video:FILE (played in a loop) or
     /// transparent (an alpha channel in PNG, WebM and MOV)
     behind: BackgroundSetting = "behind" "WHAT" Blur BackgroundSetting::from_str;
+    /// Whether the blur behind cannot be undone: detail is averaged over cells of half its radius
+    privacy: Privacy = "privacy" "WHEN" Blur Privacy::from_str, one of list_choices::<Privacy>();
     /// Keep the subject in the middle by showing a part of the picture: the largest zoom, up to 4, or off
     follow: FramingZoom = "follow" "ZOOM" Blur FramingZoom::from_str;
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height

@@ -31,6 +31,8 @@ pub struct LookFacts {
     pub size: (u32, u32),
     /// Whether all outputs have an alpha channel.
     pub keeps_alpha: bool,
+    /// Whether an output leaves for a call: a virtual camera, or a live pipeline of another program.
+    pub is_for_call: bool,
 }
 
 impl Look {
@@ -42,6 +44,7 @@ impl Look {
         if look.effect.follows_depth() && !facts.has_depth {
             look.effect = Effect::Blur;
         }
+        look.is_for_call = facts.is_for_call;
         look.is_depth_relative = facts.has_depth && facts.metres == Metres::Missing;
         if facts.metres != Metres::Unknown {
             look.focus = look.focus.for_depth(look.is_depth_relative).unwrap_or(FocusRule::Auto);

@@ -96,12 +96,15 @@ impl<R: ControllableRun + 'static> Controller<R> {
         Ok(Answer::Done { status: Box::new(self.status()?), note })
     }
 
-    /// Changes the look. Returns one line on what of the change is left out, or has no effect.
+    /// Changes the look. Returns one line on what of the change is left out, or has no effect, and on a blur that is too
+    /// small for privacy.
     fn change_look(&self, change: Change) -> Result<Option<String>, Answer> {
         let patch = change.patch.clone();
         let changed = self.run.change_look(change)?;
         let unused = (self.command_line.describe_unused)(&patch, &changed);
-        let lines: Vec<String> = changed.note.into_iter().chain(unused).collect();
+        let size = self.run.status()?.size.unwrap_or_default();
+        let small_blur = changed.look.small_blur(size).map(|small| small.to_string());
+        let lines: Vec<String> = changed.note.into_iter().chain(unused).chain(small_blur).collect();
         Ok(Some(lines.join("; ")).filter(|line| !line.is_empty()))
     }
 

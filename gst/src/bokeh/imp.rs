@@ -42,6 +42,8 @@ pub(super) struct Counts {
     /// Pictures dropped before the first map.
     pub without_map: u64,
     pub quality: &'static str,
+    /// Whether the blur of what is behind cannot be undone.
+    pub private: bool,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -82,7 +84,7 @@ impl ObjectImpl for Imp {
     fn property(&self, id: usize, spec: &glib::ParamSpec) -> glib::Value {
         let kept = lock(&self.values).get(PROPERTIES[id - 1], spec);
         kept.unwrap_or_else(|| {
-            let Counts { pictures, maps, shared, late, without_map, quality } = *lock(&self.counts);
+            let Counts { pictures, maps, shared, late, without_map, quality, private } = *lock(&self.counts);
             gst::Structure::builder("stats")
                 .field("pictures", pictures)
                 .field("maps", maps)
@@ -90,6 +92,7 @@ impl ObjectImpl for Imp {
                 .field("late", late)
                 .field("without-map", without_map)
                 .field("quality", quality)
+                .field("private", private)
                 .build()
                 .to_value()
         })

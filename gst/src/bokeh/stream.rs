@@ -20,10 +20,12 @@ pub struct Stream {
     pictures: Option<Pictures>,
     maps: Maps,
     processor: Option<FrameProcessor>,
-    /// Parameters of the processor: the look, the version of the settings, and whether there is depth.
+    /// Parameters of the processor: the look, the version of the settings, whether there is depth, and whether the
+    /// pipeline is live.
     look: Look,
     version: u64,
     has_depth: bool,
+    is_live: bool,
     time: MediaTime,
     /// Whether the warning about missing maps was posted.
     has_warned: bool,
@@ -180,9 +182,12 @@ impl Imp {
 
     /// Applies changed settings to the processor, or creates it.
     fn update_processor(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
+        // Only a live pipeline has a latency.
+        let is_live = self.obj().latency().is_some();
         let values = {
             let values = lock(&self.values);
-            if stream.processor.is_some() && (stream.version, stream.has_depth) == (values.version, has_depth) {
+            let made_for = (stream.version, stream.has_depth, stream.is_live);
+            if stream.processor.is_some() && made_for == (values.version, has_depth, is_live) {
                 return Ok(());
             }
             values.clone()
@@ -190,11 +195,15 @@ impl Imp {
         if stream.has_depth != has_depth {
             stream.processor = None;
         }
-        (stream.version, stream.has_depth) = (values.version, has_depth);
+        (stream.version, stream.has_depth, stream.is_live) = (values.version, has_depth, is_live);
         let size = stream.pictures.as_ref().map(Pictures::size).ok_or(gst::FlowError::NotNegotiated)?;
         let followed = values.look(&stream.look).and_then(|look| {
-            let facts = LookFacts { has_depth, metres: Metres::Known, size, ..LookFacts::default() };
+            let metres = Metres::Known;
+            let facts = LookFacts { has_depth, metres, size, is_for_call: is_live, ..LookFacts::default() };
             let (fitting, _) = look.change(&Change::default(), &facts).map_err(|error| error.to_string())?;
+            if let Some(small) = fitting.small_blur(size) {
+                gst::element_imp_info!(self, gst::LibraryError::Settings, ("{}", as_properties(&small.to_string())));
+            }
             let done = match &mut stream.processor {
                 Some(processor) => processor.set_look(&fitting),
                 None => {
@@ -208,6 +217,7 @@ impl Imp {
                 }
             };
             stream.look = look;
+            lock(&self.counts).private = fitting.is_private();
             done.map_err(|error| error.to_string())
         });
         match followed {

@@ -62,6 +62,11 @@ fn wait_for(pipeline: &gst::Pipeline, kind: gst::MessageType) -> gst::Message {
     message
 }
 
+/// Returns whether no filter can undo the blur of the element `b`.
+fn is_private(pipeline: &gst::Pipeline) -> bool {
+    pipeline.by_name("b").unwrap().property::<gst::Structure>("stats").get("private").unwrap()
+}
+
 #[test]
 fn a_seek_goes_to_where_it_says() {
     let raw = "width=64,height=48,framerate=25/1";
@@ -81,6 +86,7 @@ fn a_seek_goes_to_where_it_says() {
     wait_for(&pipeline, gst::MessageType::Eos);
     let times = times.lock().unwrap();
     assert!(times[1..].windows(2).all(|pair| pair[1] == pair[0] + PERIOD), "{times:?}");
+    assert!(!is_private(&pipeline), "no call can see it");
     pipeline.set_state(gst::State::Null).unwrap();
 }
 
@@ -97,6 +103,7 @@ fn a_live_source_has_a_period_more_of_latency() {
     let (live, least, _) = query.result();
     // A test source has a period of its own.
     assert_eq!((live, least), (true, 2 * PERIOD));
+    assert!(is_private(&pipeline), "a call may see it");
     assert_eq!(times.lock().unwrap().len(), 20);
     pipeline.set_state(gst::State::Null).unwrap();
 }

@@ -10,6 +10,7 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::error::CliError;
+use crate::log;
 use crate::options;
 use crate::settings::layers::GivenSettings;
 use crate::settings::look;
@@ -224,6 +225,7 @@ fn measure_blur(
 ) -> Result<Measurement, CliError> {
     let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
     let size = color.size();
+    look.small_blur(size).iter().for_each(|small| log::note(&small.to_string()));
     let Some(settings) = look.blur_settings(size, false) else {
         return Err(CliError::Usage(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),

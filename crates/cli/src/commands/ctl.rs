@@ -177,7 +177,7 @@ fn describe_state(status: &Status) -> &'static str {
 
 /// Formats the status as text.
 fn format_status_text(status: &Status) -> String {
-    let Status { name, pid, command, source, size, sinks, watched, quality, fps, look, uptime_s, .. } = status;
+    let Status { name, pid, command, source, size, sinks, watched, quality, private, fps, look, uptime_s, .. } = status;
     let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
     let watched = match watched {
         Some(true) => "; watched",
@@ -186,6 +186,7 @@ fn format_status_text(status: &Status) -> String {
     };
     let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };
     let quality = quality.as_ref().map_or("not blurred".to_owned(), |quality| format!("quality {quality}"));
+    let private = if *private { ", private" } else { "" };
     let is_alias = |name: &str| settings::resolve_alias(name) != name;
     let look = look.iter().filter(|(name, _)| !is_alias(name)).map(|(name, value)| format!("{name}={value}"));
     let look: Vec<String> = look.collect();
@@ -196,7 +197,7 @@ fn format_status_text(status: &Status) -> String {
     let _ = write!(
         text,
         "  run      {command}, process {pid}, since {hours}:{minutes:02}:{seconds:02}\n  source   {source}{size}\n  \
-         to       {sinks}{watched}\n  frames   {fps:.1} a second, {quality}\n  look     {}\n",
+         to       {sinks}{watched}\n  frames   {fps:.1} a second, {quality}{private}\n  look     {}\n",
         look.join(" ")
     );
     text

@@ -132,8 +132,8 @@ impl Opened {
         let info = source.camera.info();
         let is_live = info.live || to.iter().any(Target::is_live);
         let pace = parts.stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-        let keeps_alpha = to.iter().all(Target::keeps_alpha);
-        let facts = LookFacts { keeps_alpha, ..source.look_facts(&options)? };
+        let (keeps_alpha, is_for_call) = (to.iter().all(Target::keeps_alpha), to.iter().any(Target::is_camera));
+        let facts = LookFacts { keeps_alpha, is_for_call, ..source.look_facts(&options)? };
         let look = requested.fit(source.findings.focus, &facts)?;
         focus::note_place(&requested.look, &look);
         // Outputs have an alpha channel only if they are opened for it.

@@ -41,7 +41,8 @@ impl RequestedLook {
         }
     }
 
-    /// Returns the look as far as a run can have it, and logs a note on what is left out. The focus that was `found` in a
+    /// Returns the look as far as a run can have it, and logs notes on what is left out, and on a blur that is too small
+    /// for privacy. The focus that was `found` in a
     /// photo replaces an automatic one.
     ///
     /// # Errors
@@ -52,7 +53,8 @@ impl RequestedLook {
             change.patch.focus = found.or(change.patch.focus);
         }
         let (look, note) = self.look.change(&change, facts)?;
-        note.iter().for_each(|line| log::note(line));
+        let small_blur = look.small_blur(facts.size).map(|small| small.to_string());
+        note.iter().chain(&small_blur).for_each(|line| log::note(line));
         Ok(look)
     }
 }

@@ -5,6 +5,7 @@
 use super::layers::Setting;
 use super::table::{WINDOW_START, WINDOW_STATE, active_variable};
 use crate::log;
+use bokehcam::bokeh::Method;
 use bokehcam::look::{Effect, Look, Strength, Value};
 use bokehcam_live::source::{DepthOrigin, Kind};
 
@@ -21,6 +22,8 @@ pub struct RunFacts {
     pub effect: Effect,
     /// Whether the strength is given as a lens.
     pub lens: bool,
+    /// Whether every pixel gathers its blur, by the exact method.
+    pub gathers: bool,
     /// Whether frames come in real time.
     pub realtime: bool,
     /// Whether the user chose the CPU backend.
@@ -35,7 +38,8 @@ impl RunFacts {
     /// Returns these facts with those of a source of frames, the origin of its depth, and the look.
     pub fn for_look(self, source: FrameOrigin, depth: DepthOrigin, look: &Look) -> Self {
         let (effect, lens) = (look.effect, matches!(look.strength, Strength::Lens(_)));
-        Self { source, depth, uses_depth: effect.follows_depth(), effect, lens, ..self }
+        let (uses_depth, gathers) = (effect.follows_depth(), look.method == Method::Gather);
+        Self { source, depth, uses_depth, effect, lens, gathers, ..self }
     }
 }
 
@@ -48,6 +52,7 @@ impl Default for RunFacts {
             uses_depth: false,
             effect: Effect::None,
             lens: false,
+            gathers: false,
             realtime: false,
             cpu_only: false,
             compresses: false,
@@ -126,6 +131,10 @@ const NEEDS: &[Requirement] = &[
     }),
     (&["follow"], |run| needs_frames(run).or(needs_dof(run))),
     (&["reuse"], |run| needs_frames(run).or(needs_blur(run))),
+    (&["privacy"], |run| match run.uses_depth && run.gathers {
+        true => Some("the method gather keeps all detail: leave --method out"),
+        false => needs_blur(run),
+    }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["blur", "f-number", "focal-length", "sensor-width"], |run| match run.source {
         FrameOrigin::Bench => Some("`bench` takes --coc"),
@@ -306,6 +315,14 @@ mod tests {
         );
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &RunFacts { realtime: true, ..dof }).is_none());
         assert!(why("rim", &RunFacts { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
+        assert_eq!(why("privacy", &dof), None);
+        assert_eq!(
+            why("privacy", &RunFacts { effect: Effect::None, uses_depth: false, ..dof }),
+            Some("nothing is blurred")
+        );
+        let exact = RunFacts { gathers: true, ..dof };
+        assert!(why("privacy", &exact).is_some_and(|why| why.contains("gather")));
+        assert_eq!(why("privacy", &RunFacts { gathers: true, ..blurred }), None, "it is a method for depth");
         for (kind, is_unused) in [(Kind::Recording, false), (Kind::Demo, true), (Kind::Photo, true)] {
             assert_eq!(why("fps", &RunFacts { source: FrameOrigin::Source(kind), ..dof }).is_some(), is_unused);
         }

@@ -105,6 +105,9 @@ pub struct Status {
     pub watched: Option<bool>,
     /// The quality level of the blur; `None` if nothing is blurred.
     pub quality: Option<String>,
+    /// Whether the blur of what is behind cannot be undone.
+    #[serde(default)]
+    pub private: bool,
     /// Current frames per second.
     pub fps: f64,
     /// The settings of the look, by name.

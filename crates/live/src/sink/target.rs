@@ -133,7 +133,7 @@ impl Target {
         self.is_camera() || *self == Self::Window
     }
 
-    /// Whether this is a virtual camera.
+    /// Whether this is a virtual camera, whose pictures leave for a call.
     pub fn is_camera(&self) -> bool {
         matches!(self, Self::Device(_) | Self::PipeWire(_) | Self::Filter)
     }
@@ -180,5 +180,22 @@ fn is_same_place(one: &Path, other: &Path) -> bool {
     match (device(one), device(other)) {
         (Some(one), Some(other)) => one.rdev() == other.rdev(),
         _ => place::resolve_links(one) == place::resolve_links(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_leaves_for_a_call_is_a_camera_and_nothing_else_is() {
+        for (names, is_camera) in [
+            (&["pipewire", "pipewire:Desk", "filter", "/dev/video7"][..], true),
+            (&["null", "-", "window", "film.mp4", "film.y4m", "pictures/"], false),
+        ] {
+            for name in names {
+                assert_eq!(name.parse::<Target>().unwrap().is_camera(), is_camera, "{name}");
+            }
+        }
     }
 }

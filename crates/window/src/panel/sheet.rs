@@ -146,7 +146,7 @@ fn add_header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         let buttons = [
             (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
             (Icon::Redo, "Redo (Ctrl+Shift+Z)", redo, Action::Redo),
-            (Icon::Reset, "Back to the usual look (R)", state.look != state.first_look, Action::Reset),
+            (Icon::Reset, "Back to the usual look (R)", state.is_look_changed(), Action::Reset),
             (Icon::Help, "Keys (F1)", true, Action::Help(!state.help)),
             (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
         ];

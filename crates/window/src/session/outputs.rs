@@ -170,6 +170,11 @@ impl Outputs {
         self.opened.iter().filter(|opened| !opened.is_withheld).map(|opened| opened.output.clone()).collect()
     }
 
+    /// Whether a virtual camera is on.
+    pub fn has_virtual_camera(&self) -> bool {
+        self.opened.iter().any(|opened| !opened.is_withheld && opened.output.is_camera)
+    }
+
     /// Whether a program reads a virtual camera.
     pub fn is_watched(&self) -> bool {
         self.opened.iter().any(|opened| !opened.is_withheld && opened.is_watched())

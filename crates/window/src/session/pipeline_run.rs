@@ -47,7 +47,9 @@ impl PipelineRun {
         let (info, seeker) = (source.camera.info(), source.camera.seeker());
         let (guide, depth_from) = (source.guide.clone(), source.depth_from);
         let kind = SourceName::from_str(&name).map_or(Kind::default(), |name| name.kind());
-        let facts = LookFacts { has_depth, metres: camera.metres, size: info.size, ..LookFacts::default() };
+        let is_for_call = outputs.has_virtual_camera() || config.outputs.iter().any(|output| output.is_camera);
+        let facts =
+            LookFacts { has_depth, metres: camera.metres, size: info.size, is_for_call, ..LookFacts::default() };
         let look = config.look.for_source(&facts);
         let (blurring, changes) = BlurSetup::create(look, (info.size, ADAPTIVE_QUALITY), |settings| {
             config.services.create_executor(settings, info.size)

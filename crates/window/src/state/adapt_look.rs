@@ -1,7 +1,7 @@
 //! Adapts the look to the source.
 
 use super::{Source, State};
-use bokehcam::look::{Effect, Look, LookFacts, Metres};
+use bokehcam::look::{Effect, Look, LookFacts, Metres, SmallBlur};
 
 impl State {
     /// Returns what the source allows a look. The outputs of a window have no alpha channel.
@@ -11,7 +11,23 @@ impl State {
             _ => (Metres::Unknown, (0, 0)),
         };
         let (has_depth, is_declined) = (self.may_have_depth(), self.has_declined_depth());
-        LookFacts { has_depth, is_declined, metres, size, keeps_alpha: false }
+        let is_for_call = self.virtual_camera().is_some();
+        LookFacts { has_depth, is_declined, metres, size, keeps_alpha: false, is_for_call }
+    }
+
+    /// Returns the look as the outputs get it now: a call may have begun since it was chosen.
+    pub fn effective_look(&self) -> Look {
+        self.look.for_source(&self.look_facts())
+    }
+
+    /// Returns the blur if it is too small for the privacy that it has now.
+    pub fn small_blur(&self) -> Option<SmallBlur> {
+        self.effective_look().small_blur(self.look_facts().size)
+    }
+
+    /// Returns whether the look is another than at the start.
+    pub fn is_look_changed(&self) -> bool {
+        self.effective_look() != self.first_look.for_source(&self.look_facts())
     }
 
     /// Returns the look to be saved: as the user chose it, before it was adapted to the source.
@@ -32,11 +48,11 @@ impl State {
 mod tests {
     use super::super::apply::NO_METRES;
     use super::super::sample::{look, running, state};
-    use super::super::{Action, Camera, Request, Update, tweak};
+    use super::super::{Action, Camera, Output, Request, Update, tweak};
     use super::*;
     use bokehcam::depth::focus::FocusRule;
     use bokehcam::look::presets::Preset;
-    use bokehcam::look::{Change, Patch, Strength};
+    use bokehcam::look::{Change, Patch, Privacy, Strength};
 
     #[test]
     fn where_depth_is_relative_no_look_has_metres() {
@@ -65,6 +81,21 @@ mod tests {
             assert!(state.look.rim == 0.7 && !state.look.needs_metres(), "{:?}", state.look);
             assert_eq!(state.notes.last().unwrap().text, NO_METRES);
         }
+    }
+
+    #[test]
+    fn a_call_that_begins_makes_the_look_private_and_changes_nothing_else() {
+        let mut state = state();
+        state.look = Look { strength: Strength::Percent(1.0), ..look() };
+        state.first_look = state.look.clone();
+        assert_eq!((state.effective_look().is_private(), state.small_blur()), (false, None));
+        state.outputs = vec![Output { name: "/dev/video9".into(), is_camera: true }];
+        assert!(state.effective_look().is_private() && !state.is_look_changed());
+        assert!(state.small_blur().is_some_and(|small| !small.is_raised));
+        state.look.privacy = Privacy::On;
+        assert!(state.small_blur().is_some_and(|small| small.is_raised) && state.is_look_changed());
+        state.outputs[0].is_camera = false;
+        assert!(state.effective_look().is_private(), "a recording, too, if it is on");
     }
 
     #[test]

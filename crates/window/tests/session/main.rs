@@ -150,6 +150,33 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     assert_eq!(written.lock().unwrap().iter().filter(|line| *line == "camera complete").count(), 1);
 }
 
+#[test]
+fn what_a_call_sees_is_private_and_nothing_else() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    let is_private = Arc::clone(&watched.services.is_private);
+    let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
+    let has = |told: &Update, count: usize| matches!(told, Update::Outputs(outputs) if outputs.len() == count);
+    watched.session.send(Request::StartOutput(output("film", false)));
+    watched.until("a recording", |told| has(told, 1));
+    assert!(!is_private.load(Ordering::SeqCst), "a recording is no call");
+    watched.session.send(Request::StartOutput(output("camera", true)));
+    watched.until("a camera", |told| has(told, 2));
+    assert!(is_private.load(Ordering::SeqCst));
+    let even = Look { effect: Effect::Blur, ..look() };
+    watched.session.send(Request::Look(Box::new(even)));
+    watched.frame("another look", |view| radius_px(view) < 0.0);
+    assert!(is_private.load(Ordering::SeqCst), "every look of the call is");
+    watched.session.send(Request::StopOutput(output("camera", true)));
+    watched.until("no camera", |told| has(told, 1));
+    assert!(!is_private.load(Ordering::SeqCst));
+    watched.session.send(Request::StartOutput(output("camera", true)));
+    watched.session.send(Request::Open("48".into()));
+    watched.until("the other runs", |told| is_running(told, 48));
+    assert!(is_private.load(Ordering::SeqCst), "the call goes on with another source");
+    watched.heard.session.close();
+}
+
 /// Whatever the source does, a call sees pictures or the card without an end, in time.
 #[test]
 fn a_call_goes_on_through_thirty_changes_of_source_and_depth() {

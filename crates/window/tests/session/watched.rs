@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bokehcam::bokeh::{self, Bokeh};
@@ -28,6 +28,7 @@ use super::store::NoStore;
 /// exist.
 struct Small {
     executors: Arc<AtomicUsize>,
+    is_private: Arc<AtomicBool>,
     written: Arc<Mutex<Vec<String>>>,
     readers: Arc<Mutex<Option<Demand>>>,
     settings: NoStore,
@@ -119,6 +120,7 @@ impl Services for Small {
     }
     fn create_executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.executors.fetch_add(1, Ordering::SeqCst);
+        self.is_private.store(settings.privacy, Ordering::SeqCst);
         bokeh::create_blur(settings, size, None, Some(1)).map_err(|error| error.to_string())
     }
     fn open_output(&mut self, name: &str, options: sink::Options) -> Result<Box<dyn Sink>, String> {
@@ -140,6 +142,8 @@ impl Services for Small {
 /// What a test sees of these services.
 pub struct FrameInput {
     pub executors: Arc<AtomicUsize>,
+    /// Whether the last executor is private.
+    pub is_private: Arc<AtomicBool>,
     pub written: Arc<Mutex<Vec<String>>>,
     /// The demand of the output that was opened last.
     pub readers: Arc<Mutex<Option<Demand>>>,
@@ -154,13 +158,15 @@ impl Watched {
     }
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
-        let (executors, written, readers) = (Arc::default(), Arc::default(), Arc::default());
+        let (executors, is_private) = (Arc::default(), Arc::default());
+        let (written, readers) = (Arc::default(), Arc::default());
         let services = FrameInput {
             executors: Arc::clone(&executors),
+            is_private: Arc::clone(&is_private),
             written: Arc::clone(&written),
             readers: Arc::clone(&readers),
         };
-        let small = Small { executors, written, readers, settings: NoStore };
+        let small = Small { executors, is_private, written, readers, settings: NoStore };
         Self { heard: Heard::begin(Box::new(small), source, folder), services }
     }
 }

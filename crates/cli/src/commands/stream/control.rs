@@ -14,7 +14,7 @@ use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Change, Look, LookFacts, Patch};
+use bokehcam::look::{Change, Look, LookFacts, Patch, Privacy};
 use bokehcam_live::control::{Answer, Claim, Server, Status, bus};
 use bokehcam_live::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
 use bokehcam_live::pipeline::{ChangeSender, Progress};
@@ -167,12 +167,14 @@ fn lock(look: &Mutex<Look>) -> MutexGuard<'_, Look> {
 impl ControllableRun for Stream {
     fn status(&self) -> Result<Status, Answer> {
         let RunInfo { status, demand, shutter, stats, .. } = &self.run;
+        let look = lock(&self.look);
         Ok(Status {
             on: !shutter.is_closed(),
             watched: demand.as_ref().map(Demand::has_watchers),
             quality: stats.quality().map(|quality| quality.name().to_owned()),
             fps: stats.pulse.per_second(stats.clock.now_ns()),
-            look: Patch::describe(&lock(&self.look)),
+            private: look.is_private(),
+            look: Patch::describe(&look),
             ..status.clone()
         })
     }
@@ -215,7 +217,8 @@ impl ControllableRun for Stream {
         // The focus stays a rule, as the picture comes without its distance.
         let look = lock(&self.look).clone();
         let quality = self.run.stats.quality().or(look.quality);
-        let settings = Patch::from_look(&Look { quality, ..look }).values();
+        let privacy = if look.is_private() { Privacy::On } else { look.privacy };
+        let settings = Patch::from_look(&Look { quality, privacy, ..look }).values();
         let source = self.run.kind.name();
         let snapshot = Snapshot { picture: &picture, sources: None, settings: &settings, source };
         let saved = match to {

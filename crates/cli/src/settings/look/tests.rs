@@ -6,7 +6,7 @@ use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::look::{ApertureSetting, CocRule, Effect, Metres, Patch, Refine, SETTINGS, Strength, Tilt};
+use bokehcam::look::{ApertureSetting, CocRule, Effect, Metres, Patch, Privacy, Refine, SETTINGS, Strength, Tilt};
 use bokehcam::optics::{CocField, Lens};
 
 const SIZE: (u32, u32) = (640, 450);
@@ -139,6 +139,9 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         look.aperture = Aperture { shape: ApertureSetting::Image(picture.to_owned()).load().unwrap(), intensity: -1.0 };
     });
     add(&|look| look.method = bokeh::Method::Gather);
+    for privacy in [Privacy::On, Privacy::Off] {
+        add(&|look| look.privacy = privacy);
+    }
     for refine in [Refine::On, Refine::Off] {
         add(&|look| look.refine = refine);
     }

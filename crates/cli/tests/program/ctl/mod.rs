@@ -92,6 +92,26 @@ fn presets_and_settings_change_the_blur_of_what_goes_out() {
 }
 
 #[test]
+fn privacy_is_told_and_a_blur_too_small_for_it_is_raised() {
+    let world = World::new();
+    let small = ["--effect", "blur", "--blur", "2"];
+    let raised = "--privacy on: the blur behind is raised from 2 to 4 px";
+    let once = [&["stream", PORTRAIT, "--frames", "1", "--to", "null", "--privacy", "on"][..], &small].concat();
+    assert!(world.run(&once).done().contains(raised));
+    let _stream = world.stream("stream", &[&["--to", "null"][..], &small].concat());
+    assert_eq!(world.status(&[])["private"], false, "nothing leaves for a call");
+    let ran = world.ctl(&["set", "privacy=on"]);
+    assert!(ran.done().contains(raised), "{}", ran.stderr);
+    let status = world.status(&[]);
+    assert_eq!(json!([status["private"], status["look"]["privacy"], status["look"]["blur"]]), json!([true, "on", "2"]));
+    assert!(world.ctl(&["status"]).printed().contains(", private\n"));
+    assert!(!world.ctl(&["set", "blur=4"]).done().contains("raised"));
+    let ran = world.ctl(&["set", "effect=none", "privacy=on"]);
+    assert!(ran.done().contains("--privacy on (nothing is blurred)"), "{}", ran.stderr);
+    assert_eq!(world.status(&[])["private"], false);
+}
+
+#[test]
 fn what_follows_depth_is_refused_where_there_is_none() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null", "--effect", "tilt-shift", "--depth", "none"]);

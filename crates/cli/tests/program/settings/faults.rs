@@ -50,3 +50,23 @@ fn the_doctor_reports_faults_of_the_settings() {
     let good = findings(&Home::new().with_settings("rim = 0.1\n"), &[]);
     assert!(good.len() == 1 && good[0].0 == "good" && good[0].1.ends_with("config.toml is valid"), "{good:?}");
 }
+
+#[cfg(feature = "camera")]
+#[test]
+fn the_doctor_says_whether_calls_are_private() {
+    for (settings, variables, level, said) in [
+        ("", &[][..], "good", "no filter can undo"),
+        ("privacy = \"off\"\n", &[], "note", "can undo the blur of what is behind"),
+        ("method = \"gather\"\n", &[], "note", "can undo the blur of what is behind"),
+        ("", &[("BOKEHCAM_BLUR", "5")], "note", "5 px at 720 rows"),
+        ("privacy = \"on\"\n", &[("BOKEHCAM_BLUR", "5")], "good", "no filter can undo"),
+        ("preset = \"weak\"\n[presets.weak]\nblur = \"1%\"\n", &[], "note", "7.2 px at 720 rows"),
+    ] {
+        let home = Home::new().with_settings(settings);
+        let told = Ran::of(home.command(&["doctor", "--json"]).envs(variables.iter().copied())).json();
+        let findings = told["findings"].as_array().unwrap();
+        let found = findings.iter().find(|finding| finding["about"] == "privacy").unwrap();
+        assert_eq!(found["level"], level, "{settings}: {found}");
+        assert!(found["found"].as_str().unwrap().contains(said), "{settings}: {found}");
+    }
+}

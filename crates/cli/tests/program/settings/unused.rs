@@ -62,6 +62,7 @@ fn recordings_say_what_they_have_no_use_for() {
         (&["--size", "640x480"], "--size 640x480"),
         (&["--budget-ms", "3"], "--budget-ms 3 (frames do not come in real time"),
         (&["--max-disparity", "32"], "--max-disparity 32 (depth does not come from two cameras)"),
+        (&["--method", "gather", "--privacy", "on"], "--privacy on (the method gather keeps all detail"),
         (&["--effect", "none", "--rim", "0.1"], "--rim 0.1, --backend cpu (nothing is blurred)"),
         (&["--effect", "tilt-shift", "--depth-scale", "5000"], "--depth-scale 5000 (the effect does not use depth)"),
     ] {

@@ -3,12 +3,12 @@
 use egui::Ui;
 
 use super::PanelForm;
-use crate::panel::widgets::{Number, add_choice, add_remark};
+use crate::panel::widgets::{Number, Tooltip, add_choice, add_dropdown, add_remark};
 use crate::state::tweak::{
     DEFAULT_LENS, F_NUMBER_RANGE, coc_fraction, f_number_for_coc, lens_coc_fraction, lens_for_look,
 };
-use crate::texts::{format_number, tr_with};
-use bokehcam::look::{MAX_COC_PER_HEIGHT, Strength};
+use crate::texts::{format_number, tr, tr_with};
+use bokehcam::look::{MAX_COC_PER_HEIGHT, Privacy, SmallBlur, Strength};
 use bokehcam::optics::Lens;
 
 /// The two modes; the value is whether lens parameters are used.
@@ -17,7 +17,13 @@ const MODES: [(&str, &str, bool); 2] = [
     ("Lens", "What a real lens does: its f-number and focal length", true),
 ];
 
-/// Adds the mode and its parameters.
+const PRIVACY: [(Privacy, &str); 3] = [(Privacy::Auto, "Auto: in calls"), (Privacy::On, "On"), (Privacy::Off, "Off")];
+/// Shown while privacy makes the blur larger than it is set.
+const RAISED: &str = "For privacy, the blur is 1.1 % of the height";
+/// Shown while a call gets a blur that is too small for privacy.
+const TOO_SMALL: &str = "The call could make out what is behind: so little blur can be undone, from 1.2 % on it cannot";
+
+/// Adds the mode and its parameters, and privacy.
 pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     let follows_depth = form.follows_depth();
     let by_lens = matches!(form.look.strength, Strength::Lens(_));
@@ -36,6 +42,24 @@ pub fn show(ui: &mut Ui, form: &mut PanelForm) {
     match form.look.strength {
         Strength::Lens(lens) => lens_numbers(ui, form, lens),
         Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => amount_number(ui, form),
+    }
+    privacy(ui, form);
+}
+
+/// Adds the list for privacy, with a remark on a blur that is too small for it.
+fn privacy(ui: &mut Ui, form: &mut PanelForm) {
+    let hint = "What is behind cannot be made out again by any filter: its detail is gone, and not only blurred";
+    ui.label(tr("Privacy")).tooltip(hint);
+    let name = |chosen: Privacy| PRIVACY.iter().find(|(of, _)| *of == chosen).map_or("", |(_, name)| tr(name));
+    let all = PRIVACY.map(|(privacy, name)| (tr(name).to_owned(), "", privacy));
+    if let Some(chosen) = add_dropdown(ui, "Privacy", name(form.look.privacy), all, &form.look.privacy) {
+        form.look.privacy = chosen;
+        form.stroke = Some("privacy");
+    }
+    match form.state.small_blur() {
+        Some(SmallBlur { is_raised: true, .. }) => add_remark(ui, RAISED),
+        Some(SmallBlur { is_raised: false, .. }) => add_remark(ui, TOO_SMALL),
+        None => {}
     }
 }
 

@@ -8,11 +8,11 @@ use crate::state::{Action, DepthMethod, DroppedFile, Output, Source, State, Tran
 use crate::texts::{self, tests as table};
 use bokehcam::depth::backdrop::Background;
 use bokehcam::depth::plate::Step;
-use bokehcam::look::{Effect, FramingZoom, Strength};
+use bokehcam::look::{Effect, FramingZoom, Privacy, Strength};
 
 /// Creates windows that together show nearly every text.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 21] = [
+    let changes: [&dyn Fn(&mut State); 22] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { frame: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -20,7 +20,14 @@ fn windows() -> Vec<Window> {
             (state.mirror, state.is_transitional) = (true, true);
         },
         &|state| state.look.effect = Effect::TiltShift,
-        &|state| (state.look.focus, state.look.strength) = (tweak::focus_on_point(0.5, 0.5), Strength::Percent(0.0)),
+        &|state| {
+            (state.look.focus, state.look.strength) = (tweak::focus_on_point(0.5, 0.5), Strength::Percent(0.0));
+            state.look.privacy = Privacy::On;
+        },
+        &|state| {
+            state.outputs.push(Output { name: "/dev/video9".into(), is_camera: true });
+            state.look.strength = Strength::Percent(0.5);
+        },
         &|state| {
             state.look.strength = Strength::Lens(tweak::DEFAULT_LENS);
             state.look.aperture.shape = bokehcam::bokeh::aperture::Shape::Ring { inner: 0.5 };

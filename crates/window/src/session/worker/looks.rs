@@ -1,5 +1,6 @@
 //! Looks of a session: applying new ones, and finding the one of a displayed frame.
 
+use std::mem;
 use std::str::FromStr;
 
 use super::super::{SaveOptions, SessionEvent, Still, held};
@@ -38,6 +39,17 @@ impl SessionWorker {
         self.pipeline
             .as_ref()
             .map_or_else(|| self.config.look.clone(), |pipeline| self.config.look.for_source(&pipeline.facts))
+    }
+
+    /// Blurs for a call from now on, or no longer.
+    pub(super) fn set_for_call(&mut self, is_for_call: bool) {
+        let is_changed = self
+            .pipeline
+            .as_mut()
+            .is_some_and(|pipeline| mem::replace(&mut pipeline.facts.is_for_call, is_for_call) != is_for_call);
+        if is_changed {
+            self.switch_look(self.config.look.clone());
+        }
     }
 
     /// Holds a frame on the screen.

@@ -206,6 +206,7 @@ impl App {
             watched: Some(state.is_watched),
             quality: self.view.as_ref().and_then(|view| Some(view.trace.quality?.name().to_owned())),
             fps: if is_moving { self.meters.frame_rate.per_second(self.clock.now_ns()) } else { 0.0 },
+            private: state.effective_look().is_private(),
             look: Patch::describe(&state.look),
             ..Status::default()
         }

@@ -1,0 +1,165 @@
+//! Privacy: whether a filter can undo the blur of what is behind.
+
+use std::fmt;
+
+use super::Look;
+use crate::bokeh::Method;
+use crate::depth::backdrop::Background;
+use crate::names::named;
+use crate::optics::CocKind;
+
+named! {
+    /// Whether the blur of what is behind cannot be undone.
+    pub enum Privacy default Auto {
+        /// For calls: a virtual camera, or a live pipeline of GStreamer
+        Auto = "auto",
+        /// Always, and a smaller blur is raised to height / 90
+        On = "on",
+        /// Never
+        Off = "off",
+    }
+}
+
+/// A blur that is too small for privacy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmallBlur {
+    /// The CoC radius at infinity that was asked for, in pixels.
+    pub asked_px: f32,
+    /// The smallest one that gives privacy, in pixels.
+    pub min_px: f32,
+    /// Whether it is raised to that; otherwise it stays as it is.
+    pub is_raised: bool,
+}
+
+impl fmt::Display for SmallBlur {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [asked_px, min_px] = [self.asked_px, self.min_px].map(|px| (px * 10.0).round() / 10.0);
+        match self.is_raised {
+            true => {
+                write!(f, "--privacy on: the blur behind is raised from {asked_px} to {min_px} px: less hides nothing")
+            }
+            false => write!(
+                f,
+                "a call sees this: a blur of {asked_px} px behind can be undone; use --blur {min_px} or more, or \
+                 --privacy on"
+            ),
+        }
+    }
+}
+
+impl Look {
+    /// Returns whether what is behind keeps no detail finer than half its blur, so that no filter can undo it. The
+    /// method `gather` cannot do so.
+    pub fn is_private(&self) -> bool {
+        let can_be = match self.coc_kind() {
+            None => false,
+            Some(CocKind::Depth) => self.method == Method::Layered,
+            Some(CocKind::Uniform | CocKind::Ramp) => true,
+        };
+        can_be
+            && match self.privacy {
+                Privacy::Auto => self.is_for_call,
+                Privacy::On => true,
+                Privacy::Off => false,
+            }
+    }
+
+    /// Returns the blur of pictures of `size` pixels if it is too small for the privacy that the look has; `None` also if
+    /// the radius depends on the focus, or the room does not show. A lens is held above the minimum at every focus, too.
+    pub fn small_blur(&self, size: (u32, u32)) -> Option<SmallBlur> {
+        let (asked_px, min_px) = (self.asked_far_px(size), min_private_px(size));
+        let shows_room = self.is_private() && self.background == Background::Blur;
+        let is_raised = self.privacy == Privacy::On;
+        (shows_room && asked_px < min_px).then_some(SmallBlur { asked_px, min_px, is_raised })
+    }
+
+    /// Returns the smallest CoC radius at infinity of pictures of `size` pixels, in pixels.
+    pub(super) fn min_far_px(&self, size: (u32, u32)) -> f32 {
+        let is_raised = self.is_private() && self.privacy == Privacy::On && self.background == Background::Blur;
+        if is_raised { min_private_px(size) } else { 0.0 }
+    }
+}
+
+/// Returns the smallest CoC radius at infinity that hides text from a filter: 8 px in pictures of 720 rows.
+fn min_private_px((_, height): (u32, u32)) -> f32 {
+    height as f32 / 90.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::focus::FocusRule;
+    use crate::look::{CocRule, Effect, LookFacts, Patch, Strength};
+    use crate::optics::{CocField, Lens};
+
+    const SIZE: (u32, u32) = (1280, 720);
+
+    /// Returns the look of these settings, in a call or not.
+    fn look(settings: &[(&str, &str)], is_for_call: bool) -> Look {
+        let facts = LookFacts { has_depth: true, size: SIZE, is_for_call, ..LookFacts::default() };
+        Patch::parse(settings.iter().copied()).unwrap().apply_to(&Look::default()).unwrap().for_source(&facts)
+    }
+
+    #[test]
+    fn a_call_is_private_and_a_file_is_not_unless_chosen() {
+        for (value, in_call, in_file) in [("auto", true, false), ("on", true, true), ("off", false, false)] {
+            for (is_for_call, expected) in [(true, in_call), (false, in_file)] {
+                for effect in ["dof", "tilt-shift", "blur"] {
+                    let look = look(&[("privacy", value), ("effect", effect)], is_for_call);
+                    let settings = look.blur_settings(SIZE, true).unwrap();
+                    assert_eq!((look.is_private(), settings.privacy), (expected, expected), "{value}, {is_for_call}");
+                }
+            }
+        }
+        assert!(!look(&[("privacy", "on"), ("effect", "none")], true).is_private());
+        let gather = |effect| look(&[("privacy", "on"), ("method", "gather"), ("effect", effect)], true);
+        assert!(!gather("dof").is_private() && gather("blur").is_private(), "the method is for depth");
+    }
+
+    #[test]
+    fn a_small_blur_is_raised_if_privacy_is_on_and_said_in_a_call() {
+        let said = |settings: &[(&str, &str)], is_for_call| {
+            look(settings, is_for_call).small_blur(SIZE).map(|small| small.to_string()).unwrap_or_default()
+        };
+        let raised = said(&[("privacy", "on"), ("blur", "5.25")], false);
+        assert!(raised.contains("raised from 5.3 to 8 px"), "{raised}");
+        let left = said(&[("blur", "5")], true);
+        assert!(left.contains("5 px behind can be undone; use --blur 8 or more"), "{left}");
+        for (settings, is_for_call) in [
+            (&[("blur", "5")][..], false),
+            (&[("blur", "5"), ("privacy", "off")], true),
+            (&[("blur", "5"), ("behind", "green")], true),
+            (&[("blur", "5"), ("effect", "none")], true),
+            (&[("blur", "8")], true),
+            (&[("privacy", "on")], true),
+        ] {
+            assert_eq!(said(settings, is_for_call), "", "{settings:?}");
+        }
+        for limited in [[("blur", "5"), ("max-coc", "auto")], [("blur", "20"), ("max-coc", "4")]] {
+            for (privacy, expected) in [("on", 8.0), ("auto", 0.0)] {
+                let settings = [&limited[..], &[("privacy", privacy), ("effect", "blur")]].concat();
+                let look = look(&settings, true);
+                let expected: f32 = if expected > 0.0 { expected } else { look.asked_far_px(SIZE) };
+                assert_eq!(look.blur_settings(SIZE, false).unwrap().far_max_px, expected);
+                assert_eq!(look.coc_rule(SIZE), CocRule::Fixed(CocField::Uniform { radius_px: expected }));
+            }
+        }
+    }
+
+    #[test]
+    fn a_lens_is_raised_at_every_focus() {
+        let lens = Lens { f_number: 16.0, focal_length_mm: 24.0, sensor_width_mm: 36.0 };
+        for (focus, privacy) in [(FocusRule::Auto, Privacy::On), (FocusRule::Metres(2.0), Privacy::On)] {
+            let look = Look { effect: Effect::Dof, focus, privacy, strength: Strength::Lens(lens), ..Look::default() };
+            let far_px = |look: &Look| match look.coc_rule(SIZE) {
+                CocRule::Depth { lens, max_coc_px, .. } => match lens.coc_field(2.0, 0.0, SIZE.0, max_coc_px) {
+                    CocField::Depth(coc) => coc.coc_at_infinity_px,
+                    other => panic!("{other:?}"),
+                },
+                other => panic!("{other:?}"),
+            };
+            assert_eq!(far_px(&look), 8.0);
+            assert!(far_px(&Look { privacy: Privacy::Off, ..look }) < 2.0);
+        }
+    }
+}
