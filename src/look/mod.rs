@@ -156,14 +156,13 @@ impl Look {
         };
         // Not `auto`, which becomes a uniform blur if depth is missing.
         let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
-        let privacy = if self.is_private() { Privacy::On } else { self.privacy };
-        Self { effect, focus, privacy, quality: quality.or(self.quality), ..self.clone() }
+        Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
     }
 
     /// Returns the look that reproduces the blur of one frame from its colours and its depth in a file, in which relative
     /// depth is written as metres. Otherwise as [`Look::for_frame`].
     pub fn for_saved_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
-        let look = self.for_frame(coc, quality);
+        let look = Self { privacy: self.privacy_outside_call(), ..self.for_frame(coc, quality) };
         match coc {
             CocField::Depth(coc) if look.is_depth_relative => Self {
                 strength: Strength::AtInfinity(coc.coc_at_infinity_px),

@@ -157,20 +157,8 @@ impl Patch {
         macro_rules! set {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        set!(
-            effect,
-            method,
-            focus,
-            focus_range_m,
-            refine,
-            background_memory,
-            follow,
-            tilt,
-            rim,
-            highlights,
-            reuse,
-            privacy
-        );
+        set!(effect, method, focus, focus_range_m, refine, background_memory, privacy, follow, tilt, rim);
+        set!(highlights, reuse);
         look.strength = self.merge_strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.value();

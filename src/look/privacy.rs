@@ -64,6 +64,11 @@ impl Look {
             }
     }
 
+    /// Returns the setting that gives a file the same privacy.
+    pub fn privacy_outside_call(&self) -> Privacy {
+        if self.is_private() { Privacy::On } else { self.privacy }
+    }
+
     /// Returns the blur of pictures of `size` pixels if it is too small for the privacy that the look has; `None` also if
     /// the radius depends on the focus, or the room does not show. A lens is held above the minimum at every focus, too.
     pub fn small_blur(&self, size: (u32, u32)) -> Option<SmallBlur> {

@@ -14,7 +14,7 @@ use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::link::demand::Demand;
-use bokehcam::look::{Change, Look, LookFacts, Patch, Privacy};
+use bokehcam::look::{Change, Look, LookFacts, Patch};
 use bokehcam_live::control::{Answer, Claim, Server, Status, bus};
 use bokehcam_live::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
 use bokehcam_live::pipeline::{ChangeSender, Progress};
@@ -217,7 +217,7 @@ impl ControllableRun for Stream {
         // The focus stays a rule, as the picture comes without its distance.
         let look = lock(&self.look).clone();
         let quality = self.run.stats.quality().or(look.quality);
-        let privacy = if look.is_private() { Privacy::On } else { look.privacy };
+        let privacy = look.privacy_outside_call();
         let settings = Patch::from_look(&Look { quality, privacy, ..look }).values();
         let source = self.run.kind.name();
         let snapshot = Snapshot { picture: &picture, sources: None, settings: &settings, source };
