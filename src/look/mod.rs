@@ -179,7 +179,7 @@ impl Look {
     pub fn blur_settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
         let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
-        let far_max_px = self.far_px(size);
+        let far_max_px = self.coc_at_infinity_px(size).min(max_px);
         let near_max_px = if coc == CocKind::Depth { max_px } else { 0.0 };
         Some(bokeh::Settings {
             coc,
@@ -199,7 +199,8 @@ impl Look {
 
     /// Returns the rule for the CoC of frames of `size` pixels.
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
-        let (radius_px, max_coc_px) = (self.far_px(size), self.max_coc_px(size));
+        let max_coc_px = self.max_coc_px(size);
+        let radius_px = self.coc_at_infinity_px(size).min(max_coc_px);
         match self.coc_kind() {
             None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
             Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px }),
@@ -234,22 +235,12 @@ impl Look {
         }
     }
 
-    /// Returns the largest CoC radius behind the focal plane, in pixels.
-    fn far_px(&self, size: (u32, u32)) -> f32 {
-        self.asked_far_px(size).max(self.min_far_px(size))
-    }
-
-    /// Returns the same as it was asked for, before privacy raises it.
-    fn asked_far_px(&self, size: (u32, u32)) -> f32 {
-        self.asked_px_at_infinity(size).min(self.asked_max_px(size))
-    }
-
     /// Returns the CoC radius at infinity in pixels; infinite if it depends on a focus that is not known yet.
     fn coc_at_infinity_px(&self, size: (u32, u32)) -> f32 {
-        self.asked_px_at_infinity(size).max(self.min_far_px(size))
+        self.asked_at_infinity_px(size).max(self.min_far_px(size))
     }
 
-    fn asked_px_at_infinity(&self, (width, height): (u32, u32)) -> f32 {
+    fn asked_at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
             (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
@@ -269,7 +260,7 @@ impl Look {
     fn asked_max_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.asked_px_at_infinity(size)),
+            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.asked_at_infinity_px(size)),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }

@@ -72,7 +72,8 @@ impl Look {
     /// Returns the blur of pictures of `size` pixels if it is too small for the privacy that the look has; `None` also if
     /// the radius depends on the focus, or the room does not show. A lens is held above the minimum at every focus, too.
     pub fn small_blur(&self, size: (u32, u32)) -> Option<SmallBlur> {
-        let (asked_px, min_px) = (self.asked_far_px(size), min_private_px(size));
+        let asked_px = self.asked_at_infinity_px(size).min(self.asked_max_px(size));
+        let min_px = min_private_px(size);
         let shows_room = self.is_private() && self.background == Background::Blur;
         let is_raised = self.privacy == Privacy::On;
         (shows_room && asked_px < min_px).then_some(SmallBlur { asked_px, min_px, is_raised })
@@ -140,11 +141,12 @@ mod tests {
         ] {
             assert_eq!(said(settings, is_for_call), "", "{settings:?}");
         }
-        for limited in [[("blur", "5"), ("max-coc", "auto")], [("blur", "20"), ("max-coc", "4")]] {
-            for (privacy, expected) in [("on", 8.0), ("auto", 0.0)] {
+        for (limited, asked_px) in
+            [([("blur", "5"), ("max-coc", "auto")], 5.0), ([("blur", "20"), ("max-coc", "4")], 4.0)]
+        {
+            for (privacy, expected) in [("on", 8.0), ("off", asked_px)] {
                 let settings = [&limited[..], &[("privacy", privacy), ("effect", "blur")]].concat();
                 let look = look(&settings, true);
-                let expected: f32 = if expected > 0.0 { expected } else { look.asked_far_px(SIZE) };
                 assert_eq!(look.blur_settings(SIZE, false).unwrap().far_max_px, expected);
                 assert_eq!(look.coc_rule(SIZE), CocRule::Fixed(CocField::Uniform { radius_px: expected }));
             }

@@ -170,9 +170,9 @@ impl Outputs {
         self.opened.iter().filter(|opened| !opened.is_withheld).map(|opened| opened.output.clone()).collect()
     }
 
-    /// Whether a virtual camera is on.
+    /// Whether there is a virtual camera, also one that shows the card and may be switched on again.
     pub fn has_virtual_camera(&self) -> bool {
-        self.opened.iter().any(|opened| !opened.is_withheld && opened.output.is_camera)
+        self.opened.iter().any(|opened| opened.output.is_camera)
     }
 
     /// Whether a program reads a virtual camera.

@@ -141,7 +141,7 @@ impl SessionWorker {
             Request::SetDepthMethod(depth_method) => self.set_depth_method(depth_method),
             Request::StartOutput(output) => {
                 // The blur becomes that of a call before a call sees it.
-                self.set_for_call(output.is_camera || self.outputs.has_virtual_camera());
+                self.follow_calls(output.is_camera);
                 self.add_output(output);
                 self.report_outputs();
             }
@@ -195,7 +195,7 @@ impl SessionWorker {
     }
 
     fn report_outputs(&mut self) {
-        self.set_for_call(self.outputs.has_virtual_camera());
+        self.follow_calls(false);
         let outputs = self.outputs.list();
         self.config.output_request.set_needed_in_memory(!outputs.is_empty());
         self.events.send_update(Update::Outputs(outputs));

@@ -41,8 +41,9 @@ impl SessionWorker {
             .map_or_else(|| self.config.look.clone(), |pipeline| self.config.look.for_source(&pipeline.facts))
     }
 
-    /// Blurs for a call from now on, or no longer.
-    pub(super) fn set_for_call(&mut self, is_for_call: bool) {
+    /// Blurs for a call while there is a virtual camera, or one `begins`.
+    pub(super) fn follow_calls(&mut self, begins: bool) {
+        let is_for_call = begins || self.outputs.has_virtual_camera();
         let is_changed = self
             .pipeline
             .as_mut()

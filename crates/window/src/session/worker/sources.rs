@@ -23,6 +23,7 @@ impl SessionWorker {
                 Err(mpsc::RecvTimeoutError::Timeout) => {
                     self.report_recording_size();
                     self.outputs.remove_unread();
+                    self.follow_calls(false);
                     self.report_readers();
                     self.check_devices();
                 }
