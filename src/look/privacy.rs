@@ -156,8 +156,9 @@ mod tests {
     #[test]
     fn a_lens_is_raised_at_every_focus() {
         let lens = Lens { f_number: 16.0, focal_length_mm: 24.0, sensor_width_mm: 36.0 };
-        for (focus, privacy) in [(FocusRule::Auto, Privacy::On), (FocusRule::Metres(2.0), Privacy::On)] {
-            let look = Look { effect: Effect::Dof, focus, privacy, strength: Strength::Lens(lens), ..Look::default() };
+        for focus in [FocusRule::Auto, FocusRule::Metres(2.0)] {
+            let (privacy, strength) = (Privacy::On, Strength::Lens(lens));
+            let look = Look { effect: Effect::Dof, focus, privacy, strength, ..Look::default() };
             let far_px = |look: &Look| match look.coc_rule(SIZE) {
                 CocRule::Depth { lens, max_coc_px, .. } => match lens.coc_field(2.0, 0.0, SIZE.0, max_coc_px) {
                     CocField::Depth(coc) => coc.coc_at_infinity_px,
