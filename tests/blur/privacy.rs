@@ -23,18 +23,20 @@ fn both(settings: &Settings, image: &ColorImage, map: Option<&DepthMap>, field: 
 
 /// Returns the amplitude, in linear light, of waves of `period_px` across a picture, away from its sides.
 fn amplitude(image: &ColorImage, period_px: f64, margin: usize) -> f64 {
+    use std::f64::consts::TAU;
     let width = image.width as usize;
-    let (mut real, mut imaginary, mut count) = (0.0, 0.0, 0.0);
-    for (k, pixel) in image.rgb.chunks_exact(3).enumerate() {
-        // Whole periods, so that the mean does not count.
-        let x = (k % width).wrapping_sub(margin);
-        if (x as f64) < ((width - 2 * margin) as f64 / period_px).floor() * period_px {
-            let light = f64::from(srgb_to_linear(f32::from(pixel[1]) / 255.0));
-            let (sin, cos) = (std::f64::consts::TAU * x as f64 / period_px).sin_cos();
-            (real, imaginary, count) = (real + light * cos, imaginary + light * sin, count + 1.0);
-        }
+    let (mut real, mut imaginary, mut weights) = (0.0, 0.0, 0.0);
+    for (k, pixel) in
+        image.rgb.chunks_exact(3).enumerate().filter(|(k, _)| (margin..width - margin).contains(&(k % width)))
+    {
+        let x = (k % width - margin) as f64 + 0.5;
+        // A Hann window: other waves hardly count.
+        let weight = 1.0 - (TAU * x / (width - 2 * margin) as f64).cos();
+        let (sin, cos) = (TAU * x / period_px).sin_cos();
+        let light = weight * f64::from(srgb_to_linear(f32::from(pixel[1]) / 255.0));
+        (real, imaginary, weights) = (real + light * cos, imaginary + light * sin, weights + weight);
     }
-    2.0 * f64::hypot(real, imaginary) / count
+    2.0 * f64::hypot(real, imaginary) / weights
 }
 
 #[test]
