@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod governor;
+mod leak;
 mod quality;
 mod scene;
 mod stereo_recording;
