@@ -34,7 +34,7 @@ impl Channel {
             Some(codec) => codec.transmit(&shown)?,
             None => shown,
         };
-        Ok(Observation::new(&received, &shifts_px))
+        Ok(Observation::new(&received, &shifts_px, card.wall_right()))
     }
 }
 

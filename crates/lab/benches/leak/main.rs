@@ -17,7 +17,7 @@ mod source;
 mod table;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
 
@@ -95,7 +95,7 @@ fn attack_calls(options: &Options) -> Outcome {
     table::print_head();
     for together in cases.chunks(thread::available_parallelism().map_or(1, usize::from)) {
         let lines: Vec<Outcome<Attacked>> = thread::scope(|scope| {
-            let running: Vec<_> = together.iter().map(|case| scope.spawn(|| attack_call(options, case))).collect();
+            let running: Vec<_> = together.iter().map(|case| scope.spawn(move || attack_call(options, case))).collect();
             let failed = || Err("an attack panicked".into());
             running.into_iter().map(|case| case.join().unwrap_or_else(|_| failed())).collect()
         });
@@ -112,12 +112,8 @@ fn attack_calls(options: &Options) -> Outcome {
 
 fn attack_call(options: &Options, case: &Case) -> Outcome<Attacked> {
     let card = options.card(case.kind);
-    let settings = CallSettings {
-        radius_px: case.radius_px,
-        privacy: case.privacy,
-        quality: options.quality,
-        threads: Some(1),
-    };
+    let settings =
+        CallSettings { radius_px: case.radius_px, privacy: case.privacy, quality: options.quality, threads: Some(1) };
     let seen = case.channel.observe(&card, &settings, options.frames)?;
     Ok(Attacked::new(&card, &seen, Some(case.radius_px), options.iterations))
 }
@@ -128,7 +124,7 @@ fn attack_sources(options: &Options) -> Outcome {
     table::print_head();
     for source in &options.sources {
         let pictures = source::read(source, card.size)?;
-        let seen = Observation::new(&pictures, &vec![(0.0, 0.0); pictures.len()]);
+        let seen = Observation::new(&pictures, &vec![(0.0, 0.0); pictures.len()], card.wall_right());
         let attacked = Attacked::new(&card, &seen, None, options.iterations);
         table::print_line(&["?", "?", &format!("{}, {} frames", file_name(source), pictures.len())], &attacked);
         attacked.save(options.out.as_deref(), &file_name(source))?;
@@ -136,6 +132,6 @@ fn attack_sources(options: &Options) -> Outcome {
     Ok(())
 }
 
-fn file_name(path: &PathBuf) -> String {
+fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

@@ -28,8 +28,7 @@ impl Attacked {
     /// Attacks an observation. Richardson-Lucy continues from the best guess of the Wiener filters.
     pub fn new(card: &Card, seen: &Observation, radius_px: Option<f32>, iterations: u16) -> Self {
         let (truth, light) = (Truth::new(card), seen.light());
-        let known =
-            radius_px.map(|radius_px| restore_by_wiener(seen, &truth, &Guesses::for_known_radius(radius_px)));
+        let known = radius_px.map(|radius_px| restore_by_wiener(seen, &truth, &Guesses::for_known_radius(radius_px)));
         let searched = search_by_wiener(seen, &truth);
         let guess = known.as_ref().unwrap_or(&searched).guess;
         let richardson_lucy = restore_by_richardson_lucy(seen, &truth, guess, usize::from(iterations));

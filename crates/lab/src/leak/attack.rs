@@ -100,7 +100,7 @@ pub fn restore_by_wiener(seen: &Observation, truth: &Truth<'_>, guesses: &Guesse
         for &rim in &guesses.rims {
             let disc = disc_transfer(&seen.fourier, radius_px, rim);
             for (cell_px, cell) in &cells {
-                // The plane of a real spectrum's filter is real: two filters share a transform.
+                // Filtered pictures are real: two share a transform.
                 for pair in guesses.noises.chunks(2) {
                     let noises = [pair[0], pair[pair.len() - 1]];
                     let filtered = seen.spectrum.iter().zip(disc.iter().zip(cell)).map(|(&value, (disc, cell))| {
@@ -110,8 +110,7 @@ pub fn restore_by_wiener(seen: &Observation, truth: &Truth<'_>, guesses: &Guesse
                     });
                     let plane = seen.fourier.invert(filtered.collect());
                     for (at, &noise) in pair.iter().enumerate() {
-                        let of = |value: Complex32| if at == 0 { value.re } else { value.im } + seen.average;
-                        let light = seen.cut(&plane, of);
+                        let light = seen.cut(&plane, |value| seen.average + if at == 0 { value.re } else { value.im });
                         let guess = Guess { radius_px, rim, cell_px: *cell_px, noise };
                         best.keep_better(Restored { scores: truth.score(&light), light, guess });
                     }
@@ -131,12 +130,7 @@ pub fn search_by_wiener(seen: &Observation, truth: &Truth<'_>) -> Restored {
 }
 
 /// Restores by Richardson-Lucy with one guess; the best of every tenth of `iterations` counts.
-pub fn restore_by_richardson_lucy(
-    seen: &Observation,
-    truth: &Truth<'_>,
-    guess: Guess,
-    iterations: usize,
-) -> Restored {
+pub fn restore_by_richardson_lucy(seen: &Observation, truth: &Truth<'_>, guess: Guess, iterations: usize) -> Restored {
     let fourier = &seen.fourier;
     let cell = cell_transfer(fourier, guess.cell_px);
     let disc = disc_transfer(fourier, guess.radius_px, guess.rim);

@@ -161,13 +161,18 @@ impl Card {
         Light::from_picture(&self.draw((0.0, 0.0)))
     }
 
+    /// Returns the column where the wall ends, and the person begins.
+    pub fn wall_right(&self) -> usize {
+        (self.size.0 as f32 * PERSON[0]) as usize
+    }
+
     /// Returns the depth: a person at [`PERSON_M`] before a wall at [`WALL_M`].
     pub fn depth(&self) -> DepthMap {
         let (width, height) = self.size;
         let mut map = DepthMap::new(width, height);
         map.metres.fill(WALL_M);
-        let [left, right, top] = PERSON;
-        let (left, right) = ((width as f32 * left) as usize, (width as f32 * right) as usize);
+        let [_, right, top] = PERSON;
+        let (left, right) = (self.wall_right(), (width as f32 * right) as usize);
         for row in map.metres.chunks_exact_mut(width as usize).skip((height as f32 * top) as usize) {
             row[left..right].fill(PERSON_M);
         }

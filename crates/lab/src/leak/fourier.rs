@@ -27,8 +27,7 @@ impl Fourier {
         Self { width, height, forward, inverse }
     }
 
-    /// Transforms a plane to its spectrum. Two real planes in one, `a + ib`, share a transform: that of an even `a` is
-    /// real.
+    /// Transforms a plane to its spectrum.
     pub fn transform(&self, mut plane: Vec<Complex32>) -> Vec<Complex32> {
         self.forward[0].process(&mut plane);
         let mut spectrum = transpose(&plane, self.width);
@@ -36,7 +35,7 @@ impl Fourier {
         spectrum
     }
 
-    /// Transforms a spectrum back to its plane.
+    /// Transforms a spectrum back to its plane. Two spectra of real planes share a transform: `A + iB` becomes `a + ib`.
     pub fn invert(&self, mut spectrum: Vec<Complex32>) -> Vec<Complex32> {
         self.inverse[1].process(&mut spectrum);
         let mut plane = transpose(&spectrum, self.height);

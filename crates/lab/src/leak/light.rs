@@ -33,6 +33,14 @@ impl Light {
         ColorImage { width: self.width as u32, height: self.height as u32, rgb }
     }
 
+    /// Repeats in each row the value before the column `right` from there on.
+    pub fn continue_from(&mut self, right: usize) {
+        for row in self.values.chunks_exact_mut(self.width.max(1)) {
+            let last = row[right.clamp(1, row.len()) - 1];
+            row.iter_mut().skip(right).for_each(|value| *value = last);
+        }
+    }
+
     /// Returns the values of a row in the columns from `left` to before `right`.
     pub fn row(&self, y: usize, left: usize, right: usize) -> &[f32] {
         &self.values[y * self.width + left..y * self.width + right]

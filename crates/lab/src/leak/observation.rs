@@ -27,9 +27,14 @@ pub struct Observation {
 
 impl Observation {
     /// Registers pictures of one size, whose content is moved to the right and down by `shifts_px`, and averages them
-    /// in linear light: the best that a camera that moves gives away. There is at least one picture.
-    pub fn new(pictures: &[ColorImage], shifts_px: &[(f32, f32)]) -> Self {
-        let lights: Vec<Light> = pictures.iter().map(Light::from_picture).collect();
+    /// in linear light: the best that a camera that moves gives away. There is at least one picture. The columns up to
+    /// `wall_right` count: what is sharp before the wall would disturb the restoration, so the wall's last column
+    /// continues over it.
+    pub fn new(pictures: &[ColorImage], shifts_px: &[(f32, f32)], wall_right: usize) -> Self {
+        let mut lights: Vec<Light> = pictures.iter().map(Light::from_picture).collect();
+        for light in &mut lights {
+            light.continue_from(wall_right);
+        }
         let size = lights.first().map_or((1, 1), |light| (light.width, light.height));
         let padded = |length: usize| (length + 2 * MARGIN_PX).next_multiple_of(SIDE_STEP);
         let fourier = Fourier::new(padded(size.0), padded(size.1));

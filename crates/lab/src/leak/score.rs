@@ -1,32 +1,32 @@
 //! How much of each row of a card a picture shows.
 
-use super::card::Card;
+use super::card::{Card, Row};
 use super::light::Light;
 
 /// Correlation from which people begin to read a line.
 pub const LEGIBLE: f32 = 0.6;
 
-/// The truth of a card, to compare pictures with.
+/// The sharp pixels of a card, to compare pictures with.
 pub struct Truth<'a> {
-    card: &'a Card,
-    light: Light,
+    rows: Vec<(&'a Row, Vec<f32>)>,
 }
 
 impl<'a> Truth<'a> {
     /// Draws the card.
     pub fn new(card: &'a Card) -> Self {
-        Self { card, light: card.light() }
+        let light = card.light();
+        Self { rows: card.rows.iter().map(|row| (row, scored_pixels(row, &light))).collect() }
     }
 
     /// Returns Pearson's correlation with the sharp card in linear light, for each of its rows. The picture has the
     /// card's size.
     pub fn score(&self, seen: &Light) -> Vec<f32> {
-        let pixels = |of: &Light, at: usize| {
-            let row = &self.card.rows[at];
-            (row.top..row.bottom).flat_map(|y| of.row(y, row.left, row.right).to_vec()).collect::<Vec<f32>>()
-        };
-        (0..self.card.rows.len()).map(|at| correlate(&pixels(seen, at), &pixels(&self.light, at))).collect()
+        self.rows.iter().map(|(row, sharp)| correlate(&scored_pixels(row, seen), sharp)).collect()
     }
+}
+
+fn scored_pixels(row: &Row, light: &Light) -> Vec<f32> {
+    (row.top..row.bottom).flat_map(|y| light.row(y, row.left, row.right)).copied().collect()
 }
 
 /// Returns Pearson's correlation of two series of the same length; 0 if one of them is constant.

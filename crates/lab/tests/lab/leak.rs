@@ -8,7 +8,7 @@ use bokehcam_lab::leak::observation::Observation;
 use bokehcam_lab::leak::score::{LEGIBLE, Truth, correlate};
 
 /// Room for the lines up to 40 px.
-const SIZE: (u32, u32) = (560, 300);
+const SIZE: (u32, u32) = (640, 300);
 const WORDS: &str = "MEETING WITH ACME 14:30  pin 4821";
 
 fn card(kind: Kind) -> Card {
@@ -21,7 +21,7 @@ fn restore(kind: Kind, radius_px: f32, privacy: bool, shifts_px: &[(f32, f32)]) 
     let settings = CallSettings { radius_px, privacy, quality: Quality::Balanced, threads: None };
     let mut call = Call::new(&card, &settings).unwrap();
     let shown: Vec<_> = shifts_px.iter().map(|&shift_px| call.show(&card.draw(shift_px)).unwrap()).collect();
-    let seen = Observation::new(&shown, shifts_px);
+    let seen = Observation::new(&shown, shifts_px, card.wall_right());
     let restored = restore_by_wiener(&seen, &Truth::new(&card), &Guesses::for_known_radius(radius_px));
     let sizes = card.rows.iter().map(|row| match row.content {
         Content::Text(size_px) => size_px,
@@ -73,9 +73,9 @@ fn registered_pictures_of_a_moving_camera_agree_with_one_at_rest() {
     let card = card(Kind::Dark);
     let shifts_px = hand_held_shifts_px(8);
     let drawn: Vec<_> = shifts_px.iter().map(|&shift_px| card.draw(shift_px)).collect();
-    let scores = Truth::new(&card).score(&Observation::new(&drawn, &shifts_px).light());
+    let scores = Truth::new(&card).score(&Observation::new(&drawn, &shifts_px, card.wall_right()).light());
     assert!(scores.iter().all(|&score| score > 0.95), "{scores:?}");
-    let unregistered = Truth::new(&card).score(&Observation::new(&drawn, &[(0.0, 0.0); 8]).light());
+    let unregistered = Truth::new(&card).score(&Observation::new(&drawn, &[(0.0, 0.0); 8], card.wall_right()).light());
     assert!(unregistered[0] < 0.5, "{unregistered:?}");
 }
 
