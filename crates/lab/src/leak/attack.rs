@@ -53,8 +53,8 @@ impl Guesses {
     /// Returns the guesses of an attacker who knows the program and the radius of the blur.
     pub fn for_known_radius(radius_px: f32) -> Self {
         let radii_px = [-0.5, 0.0, 0.5].map(|off_px| radius_px + off_px).to_vec();
-        let cells_px = vec![0.0, (radius_px / 2.0).max(8.0)];
-        Self { radii_px, rims: vec![0.2], cells_px, noises: NOISES.to_vec() }
+        let cells_px = vec![0.0, 4.0, (radius_px / 2.0).max(8.0)];
+        Self { radii_px, rims: vec![0.1, 0.2], cells_px, noises: NOISES.to_vec() }
     }
 
     /// Returns the guesses of one who knows nothing.
