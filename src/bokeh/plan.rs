@@ -21,8 +21,8 @@ mod slots;
 use std::sync::Arc;
 
 use band::BandRows;
-pub use privacy::CELL_SHARPNESS;
 use privacy::decimate;
+pub use privacy::{CELL_SHARPNESS, min_private_radius_px};
 
 use super::bank::{FilterBank, compensated_radius_px};
 pub use super::bin_weight::BinWeight;

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::Look;
 use crate::bokeh::Method;
+use crate::bokeh::plan::min_private_radius_px;
 use crate::depth::backdrop::Background;
 use crate::names::named;
 use crate::optics::CocKind;
@@ -73,7 +74,7 @@ impl Look {
     /// the radius depends on the focus, or the room does not show. A lens is held above the minimum at every focus, too.
     pub fn small_blur(&self, size: (u32, u32)) -> Option<SmallBlur> {
         let asked_px = self.asked_at_infinity_px(size).min(self.asked_max_px(size));
-        let min_px = min_private_px(size);
+        let min_px = min_private_radius_px(size.1 as usize);
         let shows_room = self.is_private() && self.background == Background::Blur;
         let is_raised = self.privacy == Privacy::On;
         (shows_room && asked_px < min_px).then_some(SmallBlur { asked_px, min_px, is_raised })
@@ -82,13 +83,8 @@ impl Look {
     /// Returns the smallest CoC radius at infinity of pictures of `size` pixels, in pixels.
     pub(super) fn min_far_px(&self, size: (u32, u32)) -> f32 {
         let is_raised = self.is_private() && self.privacy == Privacy::On && self.background == Background::Blur;
-        if is_raised { min_private_px(size) } else { 0.0 }
+        if is_raised { min_private_radius_px(size.1 as usize) } else { 0.0 }
     }
-}
-
-/// Returns the smallest CoC radius at infinity that hides text from a filter: 8 px in pictures of 720 rows.
-fn min_private_px((_, height): (u32, u32)) -> f32 {
-    height as f32 / 90.0
 }
 
 #[cfg(test)]
