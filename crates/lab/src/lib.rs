@@ -1,8 +1,6 @@
 //! Tools for developers of bokehcam: a scene with exact depth, rendered through a pinhole or a thin lens, the camera
-//! `synthetic` that films it, an analysis of aperture ranks, and an attack on blurred backgrounds. The benches are in
-//! `benches/`.
+//! `synthetic` that films it, and an analysis of aperture ranks. The benches are in `benches/`.
 
 pub mod aperture;
-pub mod leak;
 pub mod scene;
 pub mod synthetic;

@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use bokehcam_lab::leak::call::{Call, CallSettings, hand_held_shifts_px};
-use bokehcam_lab::leak::card::Card;
-use bokehcam_lab::leak::codec::Codec;
-use bokehcam_lab::leak::observation::Observation;
+use crate::experiment::call::{Call, CallSettings, hand_held_shifts_px};
+use crate::experiment::card::Card;
+use crate::experiment::codec::Codec;
+use crate::experiment::observation::Observation;
 
 use super::Outcome;
 

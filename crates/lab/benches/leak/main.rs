@@ -3,15 +3,16 @@
 //! | file | what |
 //! |---|---|
 //! | `options` | the command line |
+//! | `experiment` | the attack: cards, calls, deconvolution, scores; `docs/privacy.md` explains its figures |
 //! | `channel` | how a card reaches an attacker |
 //! | `source` | pictures and videos of another program |
 //! | `table` | the attacks on one card, as a line of the table |
 //!
-//! The attack itself is `bokehcam_lab::leak`; `docs/privacy.md` explains its figures.
 
 mod channel;
 #[path = "../common/mod.rs"]
 mod common;
+mod experiment;
 mod options;
 mod source;
 mod table;
@@ -21,10 +22,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
 
-use bokehcam_lab::leak::call::CallSettings;
-use bokehcam_lab::leak::card::{Card, Kind};
-use bokehcam_lab::leak::codec::has_ffmpeg;
-use bokehcam_lab::leak::observation::Observation;
+use crate::experiment::call::CallSettings;
+use crate::experiment::card::{Card, Kind};
+use crate::experiment::codec::has_ffmpeg;
+use crate::experiment::observation::Observation;
 use bokehcam_media::recording::still;
 
 use channel::Channel;

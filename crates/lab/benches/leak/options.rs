@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::experiment::card::{Card, Kind};
 use bokehcam::budget::Quality;
-use bokehcam_lab::leak::card::{Card, Kind};
 use clap::{Parser, value_parser};
 
 use super::channel::Channel;

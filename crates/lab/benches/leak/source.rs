@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::experiment::codec;
 use bokehcam::frame::ColorImage;
-use bokehcam_lab::leak::codec;
 use bokehcam_media::recording::still;
 use bokehcam_media::video::VideoFile;
 

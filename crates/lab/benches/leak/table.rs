@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use bokehcam_lab::leak::attack::{Guess, Guesses, Restored};
-use bokehcam_lab::leak::attack::{restore_by_richardson_lucy, restore_by_wiener, search_by_wiener};
-use bokehcam_lab::leak::card::{Card, Content};
-use bokehcam_lab::leak::light::Light;
-use bokehcam_lab::leak::observation::Observation;
-use bokehcam_lab::leak::score::Truth;
+use crate::experiment::attack::{Guess, Guesses, Restored};
+use crate::experiment::attack::{restore_by_richardson_lucy, restore_by_wiener, search_by_wiener};
+use crate::experiment::card::{Card, Content};
+use crate::experiment::light::Light;
+use crate::experiment::observation::Observation;
+use crate::experiment::score::Truth;
 use bokehcam_media::recording::still;
 
 use super::Outcome;

@@ -1,11 +1,14 @@
 //! Laws of privacy: text behind the focal plane cannot be restored, and the attack that fails works on a plain blur.
 
+#[path = "../../benches/leak/experiment/mod.rs"]
+mod experiment;
+
 use bokehcam::budget::Quality;
-use bokehcam_lab::leak::attack::{Guesses, restore_by_wiener};
-use bokehcam_lab::leak::call::{Call, CallSettings, hand_held_shifts_px};
-use bokehcam_lab::leak::card::{Card, Content, Kind};
-use bokehcam_lab::leak::observation::Observation;
-use bokehcam_lab::leak::score::{LEGIBLE, Truth, correlate};
+use experiment::attack::{Guesses, restore_by_wiener};
+use experiment::call::{Call, CallSettings, hand_held_shifts_px};
+use experiment::card::{Card, Content, Kind};
+use experiment::observation::Observation;
+use experiment::score::{LEGIBLE, Truth, correlate};
 
 /// Room for the lines up to 40 px.
 const SIZE: (u32, u32) = (640, 300);

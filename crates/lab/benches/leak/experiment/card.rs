@@ -8,7 +8,7 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use super::light::Light;
 
 /// Roboto Regular (Apache-2.0), the font of the window.
-const FONT: &[u8] = include_bytes!("../../../window/src/fonts/Roboto-Regular.ttf");
+const FONT: &[u8] = include_bytes!("../../../../window/src/fonts/Roboto-Regular.ttf");
 /// Sizes of the lines of text: the em of the font, in pixels.
 pub const TEXT_SIZES_PX: [u32; 5] = [14, 20, 28, 40, 56];
 /// Sizes of the poster's letters.

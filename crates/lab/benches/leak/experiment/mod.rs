@@ -10,6 +10,8 @@
 //!
 //! `docs/privacy.md` explains it; the bench `leak` and the laws of the tests run it.
 
+#![allow(dead_code)] // The bench and the tests each use a part.
+
 pub mod attack;
 pub mod call;
 pub mod card;
