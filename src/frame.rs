@@ -244,6 +244,20 @@ impl DepthMap {
         resize_buffer(&mut self.metres, width as usize * height as usize);
     }
 
+    /// Makes it a map of `width` x `height` pixels in which everything is far behind a subject that is not there: the
+    /// whole picture is blurred.
+    pub fn fill_far(&mut self, (width, height): (u32, u32)) {
+        self.resize(width, height);
+        self.metres.fill(Self::FAR_M);
+        self.matte.pixels.clear();
+        (self.subject_m, self.person_m, self.is_smooth) = (Some(Self::SUBJECT_M), None, false);
+    }
+
+    /// Returns whether the subject that the map was made around is in it; `None` if it was made around none.
+    pub fn has_subject(&self) -> Option<bool> {
+        self.subject_m.map(|subject_m| self.metres.iter().any(|&metres| metres <= subject_m))
+    }
+
     /// Copies size and content of another map, reusing its own memory if possible.
     pub fn copy_from(&mut self, other: &Self) {
         self.resize(other.width, other.height);

@@ -232,6 +232,13 @@ impl CocCalculator {
         let field = lens.coc_field(focus_m, range_m, color.width, max_coc_px);
         // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
+            if !map.metres.iter().any(|&metres| DepthMap::is_known(metres)) {
+                // The depth of an earlier frame would leave the room sharp where somebody was: all is far.
+                map.resize(color.width, color.height);
+                map.metres.fill(0.0);
+                map.matte.pixels.clear();
+                return field;
+            }
             match &mut self.postprocessor {
                 Postprocessor::Keep => {}
                 Postprocessor::Fill(filler) => filler.fill_guided(map, color),

@@ -48,14 +48,12 @@ impl CutOut {
         alpha.resize(color.rgb.len() / 3, 0);
         let pixels = color.rgb.as_chunks_mut::<3>().0.iter_mut().zip(kept.rgb.as_chunks::<3>().0);
         for ((pixel, kept), alpha) in pixels.zip(alpha) {
-            match kept[1] {
-                0 => (*pixel, *alpha) = ([0; 3], 0),
-                KEPT_CODE.. => *alpha = u8::MAX,
-                code => {
-                    let share = light.decode(code) / full;
-                    *pixel = pixel.map(|code| light.encode(light.decode(code) / share));
-                    *alpha = (share * 255.0).round() as u8;
-                }
+            let share = (light.decode(kept[1]) / full).min(1.0);
+            *alpha = (share * 255.0).round() as u8;
+            match *alpha {
+                0 => *pixel = [0; 3],
+                u8::MAX => {}
+                _ => *pixel = pixel.map(|code| light.encode(light.decode(code) / share)),
             }
         }
     }
@@ -97,5 +95,20 @@ mod tests {
         for (code, due) in pixels[1].iter().zip(near) {
             assert!(code.abs_diff(due) <= 3, "{:?} is not the subject's {near:?}", pixels[1]);
         }
+    }
+
+    #[test]
+    fn what_is_transparent_has_no_colour() {
+        // Each code of the mask, over the colour of a blurred subject.
+        let codes: Vec<u8> = (0..=255).collect();
+        let grey = |code: &u8| [*code; 3];
+        let kept = ColorImage { width: 256, height: 1, rgb: codes.iter().flat_map(grey).collect() };
+        let mut color = ColorImage { width: 256, height: 1, rgb: [90, 30, 60].repeat(256) };
+        let mut cut_out = CutOut::default();
+        cut_out.unpremultiply(&mut color, &kept);
+        let pixels = color.rgb.as_chunks::<3>().0.iter().zip(&cut_out.alpha);
+        let transparent: Vec<_> = pixels.filter(|(_, alpha)| **alpha == 0).collect();
+        assert!(transparent.len() > 1 && transparent.iter().all(|(rgb, _)| **rgb == [0; 3]), "{transparent:?}");
+        assert!(cut_out.alpha.is_sorted() && cut_out.alpha[usize::from(KEPT_CODE)..].iter().all(|alpha| *alpha == 255));
     }
 }

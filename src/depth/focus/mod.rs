@@ -26,7 +26,8 @@ pub enum FocusRule {
     Relative(f32),
     /// The person that a mask shows; without one, the nearest large subject.
     Auto,
-    /// A point, as fractions of width and height (0 to 1).
+    /// A point, as fractions of width and height (0 to 1). In a map around a subject
+    /// ([`subject_m`](DepthMap::subject_m)), the object at the point, as for [`FocusRule::Track`].
     Point {
         /// Fraction of the width, from the left.
         x: f32,
@@ -162,11 +163,14 @@ impl Focus {
                     1.0 / hysteresis.choose_subject(found, |dioptres| subject.find_near(dioptres), time_ns)
                 })
             }
-            FocusRule::Track { x, y } => {
+            FocusRule::Point { x, y } if map.subject_m.is_none() => median_depth_at(map, x, y, &mut self.window_m),
+            // In a map around a subject the rest has one distance: a subject that leaves the point, or is not there yet,
+            // must not make all of it sharp.
+            FocusRule::Point { x, y } | FocusRule::Track { x, y } => {
                 let track = self.track.get_or_insert_with(|| ObjectTrack::new([x, y]));
-                track.locate(map, time_ns, &mut self.window_m).map(f32::recip)
+                let is_located = map.has_subject() != Some(false);
+                is_located.then(|| track.locate(map, time_ns, &mut self.window_m)).flatten().map(f32::recip)
             }
-            FocusRule::Point { x, y } => median_depth_at(map, x, y, &mut self.window_m),
         };
         let Some(target_m) = target_m else {
             return self.lens.map_or(FALLBACK_M, |lens| 1.0 / lens.dioptres);
@@ -278,6 +282,28 @@ mod tests {
             let focus_m = focus.focus_m(&flat(at_m), (300 + k) * FRAME_NS);
             assert!((1.0 / focus_m - 1.0 / at_m).abs() < 0.25, "{k}: {focus_m} for {at_m}");
         }
+    }
+
+    #[test]
+    fn a_point_on_a_subject_stays_with_it_and_never_turns_to_the_room_by_itself() {
+        // A subject over some columns of 16, and nothing known of the room.
+        let around = |columns: std::ops::Range<usize>| {
+            let metres = |k: usize| if columns.contains(&(k % 16)) { DepthMap::SUBJECT_M } else { DepthMap::FAR_M };
+            let subject_m = Some(DepthMap::SUBJECT_M);
+            DepthMap { subject_m, metres: (0..256).map(metres).collect(), ..DepthMap::new(16, 16) }
+        };
+        let (nobody, middle, aside) = (around(0..0), around(4..12), around(0..4));
+        for rule in [FocusRule::Point { x: 0.5, y: 0.5 }, FocusRule::Track { x: 0.5, y: 0.5 }] {
+            let mut focus = Focus::new(rule);
+            let maps = [&nobody, &nobody, &middle, &aside, &nobody, &middle, &aside];
+            for (frame, map) in maps.into_iter().flat_map(|map| [map; 30]).enumerate() {
+                let focus_m = focus.focus_m(map, frame as u64 * FRAME_NS);
+                assert!((focus_m - DepthMap::SUBJECT_M).abs() < 1e-3, "{rule:?}, frame {frame}: {focus_m}");
+            }
+        }
+        // The room can be chosen beside somebody.
+        let focus_m = Focus::new(FocusRule::Point { x: 0.9, y: 0.5 }).focus_m(&middle, 0);
+        assert!(focus_m > 100.0, "{focus_m}");
     }
 
     #[test]

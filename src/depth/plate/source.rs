@@ -225,10 +225,7 @@ impl DepthSource for PlateDepth {
         if let (Some(companion), true) = (&mut self.companion, step != Step::Ready) {
             return companion.read(seen, map);
         }
-        map.resize(color.width, color.height);
-        map.matte.pixels.clear();
-        map.metres.fill(DepthMap::FAR_M);
-        (map.subject_m, map.is_smooth) = (Some(DepthMap::SUBJECT_M), false);
+        map.fill_far(color.size());
         if let (State::InUse(plate), Step::Ready) = (&self.state, step) {
             if let Some(companion) = &mut self.companion {
                 companion.measure_background(color, plate.mask(), map);

@@ -12,11 +12,15 @@ mod faults;
 mod frames;
 mod ladder;
 mod live;
+#[path = "../../../../tests/common/onnx.rs"]
+#[allow(dead_code)]
+mod onnx;
 #[path = "../../../../tests/common/planes.rs"]
 mod planes;
 #[path = "../../../../tests/common/portrait.rs"]
 mod portrait;
 mod replay;
+mod room;
 mod seek;
 mod setup;
 mod staging;

@@ -1,9 +1,8 @@
 //! Depth from a separate depth camera next to the colour camera.
 //!
-//! The newest maps are kept and paired with the colour frames by capture time. When the camera stops, the last map
-//! stays: a blur by an old map is wrong at its edges, but without blur the room would be visible. The loss of depth is
-//! logged once, and so is its return. Before the first map, and after a pause, there is no map, and frames are not
-//! shown.
+//! The newest maps are kept and paired with the colour frames by capture time. When the camera stops, the whole picture
+//! is blurred: by an old map, the room would be sharp where the person was. The loss of depth is logged once, and so is
+//! its return. Before the first map, and after a pause, there is no map, and frames are not shown.
 
 mod pairing;
 mod units;
@@ -19,9 +18,6 @@ use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
 use bokehcam_media::layout::Content;
 use pairing::Pairing;
-
-/// Age of the newest map in ns from which a warning is logged.
-const STALE_NS: u64 = 1_000_000_000;
 
 /// Divisor of the depth period: how long a frame waits for a better matching map.
 const WAIT_DIVISOR: u32 = 4;
@@ -81,37 +77,33 @@ impl LiveDepth {
             }
         }
     }
-
-    /// Logs when no map has arrived for a while, and when maps arrive again: each change once.
-    fn log_staleness(&mut self, now_ns: u64, newest_ns: u64) {
-        let is_stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
-        if is_stale != self.is_stale {
-            match is_stale {
-                true => tracing::warn!("{}: no depth for a second; the last map is kept", self.live.name()),
-                false => tracing::info!("{}: depth again", self.live.name()),
-            }
-            self.is_stale = is_stale;
-        }
-    }
 }
 
 impl DepthSource for LiveDepth {
-    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, color, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         self.receive_maps(Duration::ZERO);
-        let now_ns = self.clock.now_ns();
         // Colour frames without a capture time get the newest map.
-        let captured_ns = stamp.captured_ns.unwrap_or(now_ns);
+        let captured_ns = stamp.captured_ns.unwrap_or_else(|| self.clock.now_ns());
         let period_ns = self.live.negotiated().interval.period_ns();
         if self.pairing.is_worth_waiting(captured_ns, period_ns) {
             self.receive_maps(Duration::from_nanos(period_ns) / WAIT_DIVISOR);
         }
-        let Some(newest_ns) = self.pairing.newest_ns() else {
-            return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
+        let Self { live, pairing, is_stale, .. } = self;
+        if pairing.newest_ns().is_none() {
+            return Err(DepthError::Unpaired { source_name: live.name().to_owned() });
+        }
+        let nearest = pairing.nearest(captured_ns, period_ns);
+        if std::mem::replace(is_stale, nearest.is_none()) != nearest.is_none() {
+            match nearest {
+                None => tracing::warn!("{}: no depth, so everything is blurred", live.name()),
+                Some(_) => tracing::info!("{}: depth again", live.name()),
+            }
+        }
+        let Some(nearest) = nearest else {
+            map.fill_far(color.size());
+            return Ok(());
         };
-        self.log_staleness(now_ns, newest_ns);
-        let Some(nearest) = self.pairing.nearest(captured_ns) else {
-            return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
-        };
+        map.subject_m = None;
         match &mut self.registration {
             Some(registration) => registration.register(nearest, map),
             None => {

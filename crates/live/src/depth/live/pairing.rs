@@ -5,8 +5,11 @@ use bokehcam::frame::DepthMap;
 /// Number of kept maps: depth may lead or lag by a frame.
 const MAX_MAPS: usize = 3;
 
-/// Number of periods without a map after which the camera counts as stopped, and waiting would only add delay.
+/// Number of periods without a map after which the camera counts as stopped: waiting would only add delay, and the
+/// last map is of another time.
 const STOPPED_PERIODS: u64 = 4;
+/// Difference in capture time, in nanoseconds, up to which a map fits a frame at any rate: the delay of a camera.
+const MAX_DELAY_NS: u64 = 150_000_000;
 
 /// The newest maps with their capture times.
 #[derive(Debug, Default)]
@@ -49,10 +52,12 @@ impl Pairing {
         })
     }
 
-    /// Returns the map captured nearest to this time.
-    pub(super) fn nearest(&self, captured_ns: u64) -> Option<&DepthMap> {
-        let captured = self.maps.iter().zip(self.captured_ns).filter_map(|(map, at_ns)| Some((map, at_ns?)));
-        captured.min_by_key(|(_, at_ns)| at_ns.abs_diff(captured_ns)).map(|(map, _)| map)
+    /// Returns the map captured nearest to this time, of a camera with this period; `None` if it is of another time.
+    pub(super) fn nearest(&self, captured_ns: u64, period_ns: u64) -> Option<&DepthMap> {
+        let most_ns = MAX_DELAY_NS.max(STOPPED_PERIODS * period_ns);
+        let maps = self.maps.iter().zip(self.captured_ns);
+        let off = maps.filter_map(|(map, at_ns)| Some((map, at_ns?.abs_diff(captured_ns))));
+        off.filter(|&(_, off_ns)| off_ns <= most_ns).min_by_key(|&(_, off_ns)| off_ns).map(|(map, _)| map)
     }
 }
 
@@ -74,22 +79,21 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_in_time_is_taken_however_old_it_is() {
+    fn the_nearest_in_time_is_taken_unless_it_is_of_another_time() {
         let pairing = pairing(&[10, 43, 76, 110]);
-        let at = |ms: u64| pairing.nearest(ms * MS).map(|map| map.metres[0]);
-        assert_eq!(
-            [at(0), at(43), at(60), at(90), at(10_000)],
-            [Some(43.0), Some(43.0), Some(76.0), Some(76.0), Some(110.0)]
-        );
+        let at = |ms: u64, period_ms: u64| pairing.nearest(ms * MS, period_ms * MS).map(|map| map.metres[0]);
+        let near = [at(0, 33), at(43, 33), at(60, 33), at(90, 33), at(250, 11)];
+        assert_eq!(near, [Some(43.0), Some(43.0), Some(76.0), Some(76.0), Some(110.0)]);
+        assert_eq!([at(270, 33), at(270, 100), at(10_000, 100)], [None, Some(110.0), None], "a person has moved by then");
         assert_eq!(pairing.newest_ns(), Some(110 * MS));
     }
 
     #[test]
     fn before_the_first_and_after_a_rest_there_is_none() {
-        assert!(Pairing::default().nearest(5).is_none());
+        assert!(Pairing::default().nearest(5, MS).is_none());
         let mut pairing = pairing(&[10, 20]);
         pairing.clear();
-        assert!(pairing.nearest(20 * MS).is_none() && pairing.newest_ns().is_none());
+        assert!(pairing.nearest(20 * MS, 33 * MS).is_none() && pairing.newest_ns().is_none());
         assert!(!pairing.is_worth_waiting(20 * MS, 33 * MS));
     }
 
@@ -97,10 +101,10 @@ mod tests {
     fn one_that_failed_to_decode_is_not_taken() {
         let mut pairing = pairing(&[10, 20, 30]);
         pairing.oldest_mut().metres[0] = -1.0;
-        assert_eq!(pairing.nearest(0).map(|map| map.metres[0]), Some(20.0));
+        assert_eq!(pairing.nearest(0, 33 * MS).map(|map| map.metres[0]), Some(20.0));
         pairing.oldest_mut().metres[0] = 40.0;
         pairing.commit(40 * MS);
-        assert_eq!(pairing.nearest(50 * MS).map(|map| map.metres[0]), Some(40.0));
+        assert_eq!(pairing.nearest(50 * MS, 33 * MS).map(|map| map.metres[0]), Some(40.0));
     }
 
     #[test]

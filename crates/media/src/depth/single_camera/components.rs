@@ -10,8 +10,8 @@ pub struct Component {
     pub is_person: bool,
     /// Number of pixels.
     pub pixels: u32,
-    /// Number of pixels that satisfy the predicate.
-    pub matches: u32,
+    /// Numbers of pixels that satisfy each predicate.
+    pub matches: [u32; 2],
     /// Whether it touches the border of the picture.
     pub touches_border: bool,
 }
@@ -31,8 +31,9 @@ pub struct Components {
 }
 
 impl Components {
-    /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy `predicate`.
-    pub fn find(&mut self, persons: &[bool], width: usize, predicate: impl Fn(usize) -> bool) {
+    /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy two
+    /// predicates.
+    pub fn find(&mut self, persons: &[bool], width: usize, predicates: impl Fn(usize) -> [bool; 2]) {
         let Self { runs, components } = self;
         runs.clear();
         components.clear();
@@ -48,7 +49,7 @@ impl Components {
                     parent: component,
                     is_person: same[0],
                     pixels: same.len() as u32,
-                    matches: pixels.clone().map(|at| u32::from(predicate(at))).sum(),
+                    matches: pixels.clone().fold([0; 2], |counts, at| add(counts, predicates(at).map(u32::from))),
                     touches_border: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
                 // Runs above that end before this one are irrelevant to all later ones.
@@ -65,7 +66,8 @@ impl Components {
     }
 
     /// Iterates over all components.
-    pub fn iter_all(&self) -> impl Iterator<Item = &Component> {
+    #[cfg(test)]
+    fn iter_all(&self) -> impl Iterator<Item = &Component> {
         let roots = self.components.iter().enumerate().filter(|(at, component)| component.parent as usize == *at);
         roots.map(|(_, component)| component)
     }
@@ -77,6 +79,10 @@ impl Components {
             (run.pixels.clone(), &self.components[root as usize])
         })
     }
+}
+
+fn add([a, b]: [u32; 2], [c, d]: [u32; 2]) -> [u32; 2] {
+    [a + c, b + d]
 }
 
 /// Returns the root of a component.
@@ -96,7 +102,7 @@ fn merge(components: &mut [Component], a: u32, b: u32) -> u32 {
         components[young as usize].parent = old;
         let all = &mut components[old as usize];
         (all.pixels, all.matches, all.touches_border) =
-            (all.pixels + pixels, all.matches + matches, all.touches_border || touches_border);
+            (all.pixels + pixels, add(all.matches, matches), all.touches_border || touches_border);
     }
     old
 }
@@ -118,10 +124,10 @@ mod tests {
         ];
         let persons: Vec<bool> = picture.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let mut components = Components::default();
-        components.find(&persons, 10, |at| at % 10 < 5);
+        components.find(&persons, 10, |at| [at % 10 < 5, false]);
         let mut matches: Vec<_> = components
             .iter_all()
-            .map(|part| (part.is_person, part.pixels, part.matches, part.touches_border))
+            .map(|part| (part.is_person, part.pixels, part.matches[0], part.touches_border))
             .collect();
         matches.sort_unstable();
         let background = persons.iter().filter(|is| !**is).count() as u32 - 1;

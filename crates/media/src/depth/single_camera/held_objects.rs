@@ -53,6 +53,11 @@ impl HeldObjects {
             self.waited_frames.resize(alphas.len(), JOIN_FRAMES);
         }
         self.find_connected(alphas, nearness, width, threshold);
+        // Without a person, nothing is held.
+        if self.queue.is_empty() {
+            self.reset();
+            return;
+        }
         self.update_held(width);
         // Where an object continues, the person's soft outline is inside of both.
         self.beyond_rim.clone_from(&self.held);
@@ -114,9 +119,9 @@ impl HeldObjects {
     /// frames. Removes a pixel after it has been disconnected for `LEAVE_FRAMES` frames.
     fn update_held(&mut self, width: usize) {
         let Self { held, waited_frames, is_near, connected, beyond_rim, components, .. } = self;
-        components.find(connected, width, |at| held[at] || waited_frames[at] >= JOIN_FRAMES);
+        components.find(connected, width, |at| [held[at] || waited_frames[at] >= JOIN_FRAMES, false]);
         for (pixels, component) in components.runs() {
-            let joins = component.is_person && 2 * component.matches > component.pixels;
+            let joins = component.is_person && 2 * component.matches[0] > component.pixels;
             for at in pixels {
                 let stays = held[at] && is_near[at] && beyond_rim[at] && waited_frames[at] < LEAVE_FRAMES;
                 let was = std::mem::replace(&mut held[at], joins || stays);

@@ -2,7 +2,8 @@
 //!
 //! A mask value between 0 and 1 has two meanings: on an outline, a mixed pixel; elsewhere, an unsure network. Away from
 //! outlines, no pixel is half a person, so each is decided either way. An enclosed hole of which the network is unsure
-//! is filled, and a mask in which it is sure of nothing shows no person.
+//! is filled; a region of which it is mostly unsure is no person. In a live picture, a region that was not there in the
+//! mask before is background, too: what shows a room to others takes two masks that agree.
 
 use super::components::Components;
 use bokehcam::frame::Mask;
@@ -15,12 +16,12 @@ const SURE_HOLE_ALPHA: [f32; 2] = [0.15, 0.1];
 const MAX_HOLE_FRACTION: f32 = 0.02;
 /// Minimum mask value of a certain person pixel.
 const MIN_SURE_ALPHA: f32 = 0.9;
-/// Minimum fraction of certain pixels in a person's region, if no person was there, and if one was.
+/// Minimum fraction of certain pixels in a person's region, if no person was there in the mask before, and if one was.
 const MIN_SURE_FRACTION: [f32; 2] = [0.6, 0.4];
 /// Minimum size of a person's region, as a fraction of the mask.
 const MIN_COMPONENT_FRACTION: f32 = 0.001;
-/// Time for which a person may be unsure before it counts as gone.
-const MAX_UNSURE_NS: u64 = 300_000_000;
+/// Minimum fraction of a region that was a person's in the mask before, if it is the same person: they move.
+const MIN_AGREEING_FRACTION: f32 = 0.25;
 
 /// Radius of the neighbourhood for decisions: equal pixels within 1 decide half, within 2 fully.
 const RADIUS: usize = 2;
@@ -31,85 +32,91 @@ pub struct MaskPostProcessor {
     /// Whether a pixel is a person's, in this and in the previous frame.
     persons: Vec<bool>,
     previous: Vec<bool>,
+    /// Whether a pixel was in a region of which the network was sure, in the previous frame, and in this one.
+    sure_before: Vec<bool>,
+    sure: Vec<bool>,
+    /// Whether a sure region waits for a second mask.
+    is_waiting: bool,
     components: Components,
     /// Vertical sums of person pixels around each pixel of a row, within 1 and within [`RADIUS`], from [`RADIUS`] pixels
     /// beyond the border on.
     columns: [Vec<u8>; 2],
-    /// When a person was last seen; `None` before the first frame.
-    seen_ns: Option<u64>,
-    is_present: bool,
 }
 
 impl MaskPostProcessor {
     /// Resets the state, for a new scene.
     pub fn reset(&mut self) {
         self.previous.clear();
-        (self.seen_ns, self.is_present) = (None, false);
+        self.is_waiting = false;
     }
 
-    /// Writes the decided mask of a picture at `now_ns` to `decided`.
-    pub fn postprocess(&mut self, mask: &Mask, now_ns: u64, decided: &mut Mask) {
+    /// Whether the last mask had a sure region that takes a second mask to be a person.
+    pub fn is_waiting(&self) -> bool {
+        self.is_waiting
+    }
+
+    /// Writes the decided mask of a picture to `decided`. If it `takes_two`, a region is a person's from the second mask
+    /// on that has it.
+    pub fn postprocess(&mut self, mask: &Mask, takes_two: bool, decided: &mut Mask) {
         decided.clone_from(mask);
         self.classify_pixels(&mask.alpha);
         let width = mask.width as usize;
-        let Self { persons, previous, components, .. } = self;
+        let Self { persons, previous, sure_before, components, .. } = self;
         components.find(persons, width, |at| match persons[at] {
-            true => mask.alpha[at] > MIN_SURE_ALPHA,
-            false => mask.alpha[at] < SURE_HOLE_ALPHA[usize::from(previous[at])],
+            true => [mask.alpha[at] > MIN_SURE_ALPHA, sure_before[at]],
+            false => [mask.alpha[at] < SURE_HOLE_ALPHA[usize::from(previous[at])], false],
         });
-        if !self.is_person_present(now_ns) {
-            decided.alpha.fill(0.0);
-            self.previous.clear();
-            return;
-        }
+        self.drop_unsure_regions(takes_two);
         self.fill_holes();
         self.binarize_interior(width, &mut decided.alpha);
         std::mem::swap(&mut self.persons, &mut self.previous);
+        std::mem::swap(&mut self.sure, &mut self.sure_before);
     }
 
     /// Classifies each pixel by its mask value and the previous frame (hysteresis).
     fn classify_pixels(&mut self, alphas: &[f32]) {
-        let Self { persons, previous, .. } = self;
+        let Self { persons, previous, sure_before, .. } = self;
         persons.clear();
         if previous.len() == alphas.len() {
             let least = |was: bool| if was { 0.5 - HYSTERESIS } else { 0.5 + HYSTERESIS };
             persons.extend(alphas.iter().zip(&*previous).map(|(&alpha, &was)| alpha > least(was)));
         } else {
             persons.extend(alphas.iter().map(|&alpha| alpha > 0.5));
-            previous.clear();
-            previous.resize(alphas.len(), false);
+            for before in [previous, sure_before] {
+                before.clear();
+                before.resize(alphas.len(), false);
+            }
         }
     }
 
-    /// Whether a region of the mask is a person, or was one until just now.
-    fn is_person_present(&mut self, now_ns: u64) -> bool {
-        let least = MIN_COMPONENT_FRACTION * self.persons.len() as f32;
-        let sure = MIN_SURE_FRACTION[usize::from(self.is_present)];
-        let is_person =
-            |pixels: u32, sure_pixels: u32| pixels as f32 > least && sure_pixels as f32 >= sure * pixels as f32;
-        if self
-            .components
-            .iter_all()
-            .any(|component| component.is_person && is_person(component.pixels, component.matches))
-        {
-            (self.seen_ns, self.is_present) = (Some(now_ns), true);
+    /// Makes regions background that are small, mostly unsure, or not yet confirmed.
+    fn drop_unsure_regions(&mut self, takes_two: bool) {
+        let Self { persons, sure, components, .. } = self;
+        let least = MIN_COMPONENT_FRACTION * persons.len() as f32;
+        self.is_waiting = false;
+        sure.clear();
+        sure.resize(persons.len(), false);
+        for (run, component) in components.runs().filter(|(_, component)| component.is_person) {
+            let [sure_pixels, known_pixels] = component.matches.map(|count| count as f32);
+            let pixels = component.pixels as f32;
+            let is_known = known_pixels >= MIN_AGREEING_FRACTION * pixels;
+            let is_sure = pixels > least && sure_pixels >= MIN_SURE_FRACTION[usize::from(is_known)] * pixels;
+            let is_waiting = is_sure && takes_two && !is_known;
+            self.is_waiting |= is_waiting;
+            sure[run.clone()].fill(is_sure);
+            persons[run].fill(is_sure && !is_waiting);
         }
-        // At the start, an unsure region may be a person, too. Time goes back when a recording restarts.
-        let seen_ns = *self.seen_ns.get_or_insert(now_ns);
-        self.is_present &= now_ns.saturating_sub(seen_ns) <= MAX_UNSURE_NS;
-        now_ns.saturating_sub(seen_ns) <= MAX_UNSURE_NS
     }
 
-    /// Fills small enclosed holes without certain pixels.
+    /// Fills small holes without certain pixels that persons enclose.
     fn fill_holes(&mut self) {
-        let largest = (MAX_HOLE_FRACTION * self.persons.len() as f32) as u32;
-        for (pixels, component) in self.components.runs() {
-            if !component.is_person
-                && !component.touches_border
-                && component.matches == 0
-                && component.pixels <= largest
-            {
-                self.persons[pixels].fill(true);
+        let Self { persons, components, .. } = self;
+        let largest = (MAX_HOLE_FRACTION * persons.len() as f32) as u32;
+        for (pixels, component) in components.runs() {
+            let is_small_hole = !component.is_person && !component.touches_border && component.pixels <= largest;
+            // The region around it, which the pixel before is of, may have been dropped.
+            if is_small_hole && component.matches[0] == 0 && persons[pixels.start - 1] {
+                persons[pixels].fill(true);
             }
         }
     }
@@ -151,7 +158,6 @@ mod tests {
     use super::*;
 
     const SIZE: (usize, usize) = (64, 48);
-    const FRAME_NS: u64 = 33_000_000;
 
     /// Creates a mask from a function of column and row.
     fn mask(alpha: impl Fn(usize, usize) -> f32) -> Mask {
@@ -172,7 +178,7 @@ mod tests {
         let is_hole = |x: usize, y: usize| (20..20 + side).contains(&x) && (12..12 + side).contains(&y);
         let mut decided = Mask::default();
         let mask = mask(|x, y| if is_hole(x, y) { alpha } else { body(x, y) });
-        MaskPostProcessor::default().postprocess(&mask, 0, &mut decided);
+        MaskPostProcessor::default().postprocess(&mask, false, &mut decided);
         (0..SIZE.0 * SIZE.1).filter(|at| is_hole(at % SIZE.0, at / SIZE.0)).map(|at| decided.alpha[at]).collect()
     }
 
@@ -192,7 +198,7 @@ mod tests {
             48..60 if y >= 30 => 0.7,
             _ => body(x, y),
         };
-        MaskPostProcessor::default().postprocess(&mask(alpha), 0, &mut decided);
+        MaskPostProcessor::default().postprocess(&mask(alpha), false, &mut decided);
         let at = |x: usize, y: usize| decided.alpha[y * SIZE.0 + x];
         assert_eq!((at(4, 40), at(54, 40)), (0.0, 1.0));
         assert_eq!((at(59, 40), at(60, 40)), (0.7, 0.0), "at the outline, it is as it was");
@@ -202,33 +208,60 @@ mod tests {
     fn a_pixel_about_one_half_does_not_flicker() {
         let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
         let mut seen = Vec::new();
-        for frame in 0..20u64 {
+        for frame in 0..20 {
             let hand = if frame % 2 == 0 { 0.55 } else { 0.45 };
             let alpha = |x: usize, y: usize| if (48..60).contains(&x) && y >= 20 { hand } else { body(x, y) };
-            postprocessor.postprocess(&mask(alpha), frame * FRAME_NS, &mut decided);
+            postprocessor.postprocess(&mask(alpha), false, &mut decided);
             seen.push(decided.alpha[40 * SIZE.0 + 54]);
         }
         assert!(seen.iter().all(|alpha| *alpha == seen[0]), "{seen:?}");
     }
 
-    #[test]
-    fn a_room_with_nobody_is_blurred_after_half_a_second_and_who_comes_in_is_found_at_once() {
+    /// Returns how many pixels of each of these masks are a person's at least in part.
+    fn sharp_pixels(takes_two: bool, masks: &[&Mask]) -> Vec<usize> {
         let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
-        // A network's mask of an empty room: a large unsure region, and few certain pixels.
-        let room = mask(|x, y| match (x, y) {
+        let sharp = masks.iter().map(|mask| {
+            postprocessor.postprocess(mask, takes_two, &mut decided);
+            decided.alpha.iter().filter(|alpha| **alpha > 0.0).count()
+        });
+        sharp.collect()
+    }
+
+    /// A network's mask of an empty room: a large unsure region, and few certain pixels.
+    fn room() -> Mask {
+        mask(|x, y| match (x, y) {
             (30..34, 20..24) => 0.97,
             (10..40, 10..40) => 0.7,
             _ => 0.0,
+        })
+    }
+
+    #[test]
+    fn an_empty_room_is_blurred_from_the_first_mask_on_and_in_the_mask_in_which_a_person_is_lost() {
+        let (room, person) = (room(), mask(body));
+        let pixels = 32 * 40;
+        assert_eq!(sharp_pixels(false, &[&room, &room, &person, &room, &room]), [0, 0, pixels, 0, 0]);
+    }
+
+    #[test]
+    fn a_person_in_a_live_picture_takes_two_masks_that_agree() {
+        let (room, person, pixels) = (room(), mask(body), 32 * 40);
+        assert_eq!(sharp_pixels(true, &[&person, &person, &room, &person, &person]), [0, pixels, 0, 0, pixels]);
+        // A region that the network is sure of once, at the other side, is never shown, and the person stays.
+        let with_error = mask(|x, y| if x < 8 { 1.0 } else { body(x, y) });
+        assert_eq!(sharp_pixels(true, &[&person, &person, &with_error, &person])[1..], [pixels; 3]);
+        // Somebody who moves is the same person.
+        let moved = [0, 6, 12].map(|by| mask(|x, y| body(x.saturating_sub(by), y)));
+        assert!(sharp_pixels(true, &moved.each_ref())[1..].iter().all(|&sharp| sharp > 0));
+    }
+
+    #[test]
+    fn an_unsure_region_beside_a_person_is_blurred_with_its_holes() {
+        let chair = mask(|x, y| match (x, y) {
+            (4..8, 14..18) => 0.3,
+            (1..12, 10..22) => 0.7,
+            _ => body(x, y),
         });
-        let mut sharp = |mask: &Mask, frame: u64| {
-            postprocessor.postprocess(mask, frame * FRAME_NS, &mut decided);
-            decided.alpha.iter().any(|alpha| *alpha > 0.0)
-        };
-        assert!((0..60).all(|frame| !sharp(&room, frame) || frame * FRAME_NS < 500_000_000));
-        assert!(sharp(&mask(body), 60), "in the frame in which they come");
-        // The person leaves: the same delay.
-        assert!((61..120).all(|frame| !sharp(&room, frame) || (frame - 60) * FRAME_NS < 500_000_000));
-        // A moving person who is unsure for two frames remains.
-        assert!(sharp(&mask(body), 120) && sharp(&room, 121) && sharp(&room, 122));
+        assert_eq!(sharp_pixels(false, &[&chair]), [32 * 40]);
     }
 }

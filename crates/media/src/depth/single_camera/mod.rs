@@ -128,7 +128,7 @@ impl SingleCamera {
         let failed = |why| DepthError::Network { name: name.clone(), why };
         let mut grey = ColorImage::new(64, 48);
         grey.rgb.fill(128);
-        person.as_mut().map_or(Ok(()), |person| person.run(&grey, 0)).map_err(failed)?;
+        person.as_mut().map_or(Ok(()), |person| person.run(&grey, 0, false)).map_err(failed)?;
         relative_depth.as_mut().map_or(Ok(()), |relative_depth| relative_depth.run(&grey, None)).map_err(failed)
     }
 
@@ -155,8 +155,9 @@ impl SingleCamera {
     /// Runs the person network if it is due; disables it on an error.
     fn run_person_network(&mut self, color: &ColorImage, time_ns: u64) {
         // At most one run per picture.
-        let is_due = std::mem::take(&mut self.due.person);
-        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_due).map(|person| person.run(color, time_ns)) {
+        let (is_due, is_live) = (std::mem::take(&mut self.due.person), self.is_live);
+        let person = self.person.as_mut().filter(|_| is_due);
+        if let Some(Err(why)) = person.map(|person| person.run(color, time_ns, is_live)) {
             tracing::error!("{}: the network for persons is turned off, so everything is blurred: {why}", self.name);
             self.person = None;
         }

@@ -60,13 +60,14 @@ impl PersonSegmenter {
     }
 
     /// Computes the mask of a picture taken at `time_ns`. Undecided pixels are averaged with the previous frame's and
-    /// decided ones not, so that nothing lags (as in MediaPipe).
+    /// decided ones not, so that nothing lags (as in MediaPipe). If it `takes_two` masks, a person is there from the second
+    /// one on.
     ///
     /// # Errors
     /// See [`PictureNetwork::infer`].
-    pub fn run(&mut self, color: &ColorImage, time_ns: u64) -> Result<(), String> {
+    pub fn run(&mut self, color: &ColorImage, time_ns: u64, takes_two: bool) -> Result<(), String> {
         self.picture_network.set_picture(color);
-        self.is_still = self.picture_network.is_still();
+        self.is_still = self.picture_network.is_still() && !self.mask_postprocess.is_waiting();
         if self.is_still {
             return Ok(());
         }
@@ -85,7 +86,7 @@ impl PersonSegmenter {
         self.smoothed.resize(size.0, size.1);
         Arch::new().dispatch(Smooth { new: &self.decoded, previous_weight, smoothed: &mut self.smoothed.alpha });
         self.seen_ns = Some(time_ns);
-        self.mask_postprocess.postprocess(&self.smoothed, time_ns, &mut self.mask);
+        self.mask_postprocess.postprocess(&self.smoothed, takes_two, &mut self.mask);
         Ok(())
     }
 }
