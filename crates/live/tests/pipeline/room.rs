@@ -49,7 +49,8 @@ fn is_person(index: usize, x: usize, y: usize) -> bool {
     y >= 10 && person(index).is_some_and(|columns| columns.contains(&x))
 }
 
-/// Draws a frame: a wall of stripes, part of which the network takes half for a person; the person; and noise.
+/// Draws a frame: a wall of stripes, part of which the network takes half for a person when nobody is there; the person;
+/// and noise.
 fn draw(index: usize, color: &mut ColorImage) {
     color.resize(SIZE.0, SIZE.1);
     for (at, pixel) in color.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
@@ -58,7 +59,7 @@ fn draw(index: usize, color: &mut ColorImage) {
         let stripe = if x / 2 % 2 == 0 { 70 } else { 180 } + noise as u8;
         *pixel = match () {
             () if is_person(index, x, y) => [210, 40 + (x % 7) as u8, 40],
-            () if (8..40).contains(&y) && x < 40 => [stripe + 46, stripe - 46, stripe],
+            () if (8..40).contains(&y) && x < 40 && person(index).is_none() => [stripe + 46, stripe - 46, stripe],
             () => [stripe; 3],
         };
     }

@@ -55,16 +55,16 @@ impl MaskPostProcessor {
         self.is_waiting
     }
 
-    /// Writes the decided mask of a picture to `decided`. If it `takes_two`, a region is a person's from the second mask
-    /// on that has it.
-    pub fn postprocess(&mut self, mask: &Mask, takes_two: bool, decided: &mut Mask) {
+    /// Writes the decided mask of a picture to `decided`. `mask` is smoothed over time; of what the network is sure, its
+    /// own values say, `own`. If it `takes_two`, a region is a person's from the second mask on that has it.
+    pub fn postprocess(&mut self, mask: &Mask, own: &[f32], takes_two: bool, decided: &mut Mask) {
         decided.clone_from(mask);
         self.classify_pixels(&mask.alpha);
         let width = mask.width as usize;
         let Self { persons, previous, sure_before, components, .. } = self;
         components.find(persons, width, |at| match persons[at] {
-            true => [mask.alpha[at] > MIN_SURE_ALPHA, sure_before[at]],
-            false => [mask.alpha[at] < SURE_HOLE_ALPHA[usize::from(previous[at])], false],
+            true => [own[at] > MIN_SURE_ALPHA, sure_before[at]],
+            false => [own[at] < SURE_HOLE_ALPHA[usize::from(previous[at])], false],
         });
         self.drop_unsure_regions(takes_two);
         self.fill_holes();
@@ -178,7 +178,7 @@ mod tests {
         let is_hole = |x: usize, y: usize| (20..20 + side).contains(&x) && (12..12 + side).contains(&y);
         let mut decided = Mask::default();
         let mask = mask(|x, y| if is_hole(x, y) { alpha } else { body(x, y) });
-        MaskPostProcessor::default().postprocess(&mask, false, &mut decided);
+        MaskPostProcessor::default().postprocess(&mask, &mask.alpha, false, &mut decided);
         (0..SIZE.0 * SIZE.1).filter(|at| is_hole(at % SIZE.0, at / SIZE.0)).map(|at| decided.alpha[at]).collect()
     }
 
@@ -198,7 +198,8 @@ mod tests {
             48..60 if y >= 30 => 0.7,
             _ => body(x, y),
         };
-        MaskPostProcessor::default().postprocess(&mask(alpha), false, &mut decided);
+        let mask = mask(alpha);
+        MaskPostProcessor::default().postprocess(&mask, &mask.alpha, false, &mut decided);
         let at = |x: usize, y: usize| decided.alpha[y * SIZE.0 + x];
         assert_eq!((at(4, 40), at(54, 40)), (0.0, 1.0));
         assert_eq!((at(59, 40), at(60, 40)), (0.7, 0.0), "at the outline, it is as it was");
@@ -211,7 +212,8 @@ mod tests {
         for frame in 0..20 {
             let hand = if frame % 2 == 0 { 0.55 } else { 0.45 };
             let alpha = |x: usize, y: usize| if (48..60).contains(&x) && y >= 20 { hand } else { body(x, y) };
-            postprocessor.postprocess(&mask(alpha), false, &mut decided);
+            let mask = mask(alpha);
+            postprocessor.postprocess(&mask, &mask.alpha, false, &mut decided);
             seen.push(decided.alpha[40 * SIZE.0 + 54]);
         }
         assert!(seen.iter().all(|alpha| *alpha == seen[0]), "{seen:?}");
@@ -221,7 +223,7 @@ mod tests {
     fn sharp_pixels(takes_two: bool, masks: &[&Mask]) -> Vec<usize> {
         let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
         let sharp = masks.iter().map(|mask| {
-            postprocessor.postprocess(mask, takes_two, &mut decided);
+            postprocessor.postprocess(mask, &mask.alpha, takes_two, &mut decided);
             decided.alpha.iter().filter(|alpha| **alpha > 0.0).count()
         });
         sharp.collect()
@@ -253,6 +255,17 @@ mod tests {
         // Somebody who moves is the same person.
         let moved = [0, 6, 12].map(|by| mask(|x, y| body(x.saturating_sub(by), y)));
         assert!(sharp_pixels(true, &moved.each_ref())[1..].iter().all(|&sharp| sharp > 0));
+    }
+
+    #[test]
+    fn where_somebody_was_is_not_sure_because_the_mask_is_smoothed() {
+        let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
+        let (person, unsure) = (mask(body), mask(|x, y| 0.6 * body(x, y)));
+        let mut sharp = |own: &Mask| {
+            postprocessor.postprocess(&person, &own.alpha, false, &mut decided);
+            decided.alpha.iter().any(|alpha| *alpha > 0.0)
+        };
+        assert!(sharp(&person) && !sharp(&unsure));
     }
 
     #[test]

@@ -86,7 +86,7 @@ impl PersonSegmenter {
         self.smoothed.resize(size.0, size.1);
         Arch::new().dispatch(Smooth { new: &self.decoded, previous_weight, smoothed: &mut self.smoothed.alpha });
         self.seen_ns = Some(time_ns);
-        self.mask_postprocess.postprocess(&self.smoothed, takes_two, &mut self.mask);
+        self.mask_postprocess.postprocess(&self.smoothed, &self.decoded, takes_two, &mut self.mask);
         Ok(())
     }
 }
