@@ -84,7 +84,11 @@ mod tests {
         let at = |ms: u64, period_ms: u64| pairing.nearest(ms * MS, period_ms * MS).map(|map| map.metres[0]);
         let near = [at(0, 33), at(43, 33), at(60, 33), at(90, 33), at(250, 11)];
         assert_eq!(near, [Some(43.0), Some(43.0), Some(76.0), Some(76.0), Some(110.0)]);
-        assert_eq!([at(270, 33), at(270, 100), at(10_000, 100)], [None, Some(110.0), None], "a person has moved by then");
+        assert_eq!(
+            [at(270, 33), at(270, 100), at(10_000, 100)],
+            [None, Some(110.0), None],
+            "a person has moved by then"
+        );
         assert_eq!(pairing.newest_ns(), Some(110 * MS));
     }
 
