@@ -91,7 +91,8 @@ impl PersonSegmenter {
     }
 }
 
-/// Averages the undecided pixels of a mask with those of the previous frame, which `smoothed` has.
+/// Averages the undecided pixels of a mask with those of the previous frame, which `smoothed` has. Those of the room stay
+/// that: where somebody was it must not be sharp.
 struct Smooth<'a> {
     new: &'a [f32],
     previous_weight: f32,
@@ -104,7 +105,8 @@ impl WithSimd for Smooth<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         for (alpha, &new) in self.smoothed.iter_mut().zip(self.new) {
             let new = if new < MIN_ALPHA { 0.0 } else { new.min(1.0) };
-            *alpha = new + (*alpha - new) * (self.previous_weight * uncertainty(new));
+            let smoothed = new + (*alpha - new) * (self.previous_weight * uncertainty(new));
+            *alpha = if new < 0.5 { smoothed.min(0.5) } else { smoothed };
         }
     }
 }
@@ -140,6 +142,15 @@ mod tests {
         );
         assert!((previous_weight(66_666_666) - 0.64).abs() < 1e-4, "as if the missing one had been seen");
         assert!(previous_weight(400_000_000) < 0.07);
+    }
+
+    #[test]
+    fn an_undecided_pixel_is_averaged_and_where_somebody_was_is_room() {
+        let new = [0.0, 0.4, 0.4, 0.6, 1.0];
+        let mut smoothed = [1.0, 1.0, 0.2, 1.0, 0.0];
+        Arch::new().dispatch(Smooth { new: &new, previous_weight: PREVIOUS_WEIGHT, smoothed: &mut smoothed });
+        assert_eq!([smoothed[0], smoothed[1], smoothed[4]], [0.0, 0.5, 1.0]);
+        assert!((0.2..0.3).contains(&smoothed[2]) && (0.8..1.0).contains(&smoothed[3]), "{smoothed:?}");
     }
 
     #[test]
