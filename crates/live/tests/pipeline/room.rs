@@ -49,8 +49,7 @@ fn is_person(index: usize, x: usize, y: usize) -> bool {
     y >= 10 && person(index).is_some_and(|columns| columns.contains(&x))
 }
 
-/// Draws a frame: a wall of stripes, part of which the network takes half for a person when nobody is there; the person;
-/// and noise.
+/// Draws a frame: noise, the person, and a wall of stripes; an empty one, the network takes half for a person in part.
 fn draw(index: usize, color: &mut ColorImage) {
     color.resize(SIZE.0, SIZE.1);
     for (at, pixel) in color.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
