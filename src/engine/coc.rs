@@ -233,7 +233,7 @@ impl CocCalculator {
         // A map made around a subject (`subject_m`) is complete already.
         if map.subject_m.is_none() {
             if !map.metres.iter().any(|&metres| DepthMap::is_known(metres)) {
-                // The depth of an earlier frame would leave the room sharp where somebody was: all is far.
+                // The depth of an earlier frame would leave the room sharp where a person was: all is far.
                 map.resize(color.width, color.height);
                 map.metres.fill(0.0);
                 map.matte.pixels.clear();

@@ -36,7 +36,7 @@ struct Options {
     /// Folder of the network
     #[arg(long)]
     models: Option<PathBuf>,
-    /// Also lists each frame in which more than so many pixels of the room are sharp
+    /// Also lists each frame in which more than this many pixels of the room are sharp
     #[arg(long, default_value_t = usize::MAX)]
     list: usize,
     /// Passed by cargo

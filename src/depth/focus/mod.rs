@@ -301,7 +301,7 @@ mod tests {
                 assert!((focus_m - DepthMap::SUBJECT_M).abs() < 1e-3, "{rule:?}, frame {frame}: {focus_m}");
             }
         }
-        // The room can be chosen beside somebody.
+        // The room can be chosen beside a person.
         let focus_m = Focus::new(FocusRule::Point { x: 0.9, y: 0.5 }).focus_m(&middle, 0);
         assert!(focus_m > 100.0, "{focus_m}");
     }

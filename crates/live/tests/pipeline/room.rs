@@ -1,4 +1,4 @@
-//! A call never shows the room: somebody comes and goes before a wall with a mark, and no frame that leaves has the mark
+//! A call never shows the room: a person comes and goes before a wall with a mark, and no frame that leaves has the mark
 //! sharp, however depth, blur and look change or fail.
 
 use std::collections::BTreeSet;
@@ -38,7 +38,7 @@ const MARGIN_PX: usize = 10;
 /// Difference of the mark's codes within a block that counts as sharp: half of the mark's own.
 const SHARP: u8 = 55;
 
-/// The columns of the person in a frame, if somebody is there: they come, walk, and are gone from one frame to the next.
+/// The columns of the person in a frame, if a person is there: they come, walk, and are gone from one frame to the next.
 fn person(index: usize) -> Option<Range<usize>> {
     let step = index % 50;
     let left = 4 + (step * 3 + index / 50 * 7) % 36;
@@ -86,7 +86,7 @@ struct Sent {
     captured: Arc<AtomicUsize>,
     sent: Arc<AtomicUsize>,
     frames: Arc<AtomicUsize>,
-    /// Frames that show the room, and those that show somebody sharp.
+    /// Frames that show the room, and those that show a person sharp.
     leaks: Arc<Mutex<BTreeSet<usize>>>,
     persons: Arc<AtomicUsize>,
 }
@@ -121,7 +121,7 @@ impl Sink for Sent {
     }
 }
 
-/// Creates a camera of so many frames, which come about as fast as they are sent.
+/// Creates a camera of this many frames, which come about as fast as they are sent.
 fn camera(frames: usize, sent: &Sent) -> Box<dyn Camera> {
     let (name, frame_data) = ("a call".into(), FrameData::Color);
     let info = SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, frame_data };
@@ -161,7 +161,7 @@ fn open(file: &[u8]) -> Box<dyn DepthSource> {
     Box::new(SingleCamera::open(Some(&path), None, &Hints::default()).unwrap())
 }
 
-/// Runs so many frames of a call; `change` adapts the run.
+/// Runs this many frames of a call; `change` adapts the run.
 fn play(
     frames: usize,
     depth: Box<dyn DepthSource>,
@@ -177,7 +177,7 @@ fn play(
     (report, sent)
 }
 
-/// Runs so many frames, and checks that none shows the room and enough are sent; returns in how many somebody is sharp.
+/// Runs this many frames, and checks that none shows the room and enough are sent; returns in how many a person is sharp.
 fn check(frames: usize, depth: Box<dyn DepthSource>, look: &Look) -> usize {
     let (report, sent) = play(frames, depth, look, |call, _| run(call));
     report.unwrap();

@@ -252,7 +252,7 @@ mod tests {
         // A region that the network is sure of once, at the other side, is never shown, and the person stays.
         let with_error = mask(|x, y| if x < 8 { 1.0 } else { body(x, y) });
         assert_eq!(sharp_pixels(true, &[&person, &person, &with_error, &person])[1..], [pixels; 3]);
-        // Somebody who moves is the same person.
+        // A person who moves is the same person.
         let moved = [0, 6, 12].map(|by| mask(|x, y| body(x.saturating_sub(by), y)));
         assert!(sharp_pixels(true, &moved.each_ref())[1..].iter().all(|&sharp| sharp > 0));
     }

@@ -92,7 +92,7 @@ impl PersonSegmenter {
 }
 
 /// Averages the undecided pixels of a mask with those of the previous frame, which `smoothed` has. Those of the room stay
-/// that: where somebody was it must not be sharp.
+/// that: where a person was it must not be sharp.
 struct Smooth<'a> {
     new: &'a [f32],
     previous_weight: f32,
