@@ -8,8 +8,6 @@
 @group(0) @binding(3) var<storage, read> means: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> source: array<vec2<u32>>;
 
-const MIN_WEIGHT = 1e-20;
-
 fn work_size(k: u32) -> vec2<u32> {
     return select(vec2(0u), bins[k].size, bins[k].decimation > 1u);
 }

@@ -45,23 +45,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = match common::options::<Options>() {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    match std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from) {
-        Some(data) => measure(&options, &data).map_or_else(
-            |error| {
-                eprintln!("error: {error}");
-                ExitCode::FAILURE
-            },
-            |()| ExitCode::SUCCESS,
-        ),
-        None => {
-            eprintln!("error: BOKEHCAM_DATA is not set: it names the folder with rgbd/person_turning and models");
-            ExitCode::from(2)
-        }
-    }
+    common::measure_person_turning(measure)
 }
 
 /// A frame with its truth.
