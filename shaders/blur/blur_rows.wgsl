@@ -38,11 +38,6 @@ fn list_result_tiles(k: u32, corner: vec2<u32>, thread: u32) {
     }
 }
 
-fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
-    let cell = pixel / CELL;
-    return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
-}
-
 // Cached `is_covered` for the row of cells within the support, from cell `first` on.
 fn is_covered_cached(k: u32, pixel: vec2<u32>, first: u32) -> bool {
     let cell = pixel.x / CELL - first;

@@ -11,9 +11,3 @@ fn means_size(k: u32) -> vec2<u32> {
 fn mean_index(k: u32, cell: vec2<u32>) -> u32 {
     return bins[k].pixels_at + cell.y * means_size(k).x + cell.x;
 }
-
-// Pixels in cells without coverage were not written.
-fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
-    let cell = pixel / CELL;
-    return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
-}

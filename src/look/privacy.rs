@@ -75,15 +75,22 @@ impl Look {
     pub fn small_blur(&self, size: (u32, u32)) -> Option<SmallBlur> {
         let asked_px = self.asked_at_infinity_px(size).min(self.asked_max_px(size));
         let min_px = min_private_radius_px(size.1 as usize);
-        let shows_room = self.is_private() && self.background == Background::Blur;
         let is_raised = self.privacy == Privacy::On;
-        (shows_room && asked_px < min_px).then_some(SmallBlur { asked_px, min_px, is_raised })
+        (self.blurs_room_privately() && asked_px < min_px).then_some(SmallBlur { asked_px, min_px, is_raised })
+    }
+
+    /// Whether the room shows, with privacy.
+    fn blurs_room_privately(&self) -> bool {
+        self.is_private() && self.background == Background::Blur
     }
 
     /// Returns the smallest CoC radius at infinity of pictures of `size` pixels, in pixels.
     pub(super) fn min_far_px(&self, size: (u32, u32)) -> f32 {
-        let is_raised = self.is_private() && self.privacy == Privacy::On && self.background == Background::Blur;
-        if is_raised { min_private_radius_px(size.1 as usize) } else { 0.0 }
+        if self.blurs_room_privately() && self.privacy == Privacy::On {
+            min_private_radius_px(size.1 as usize)
+        } else {
+            0.0
+        }
     }
 }
 

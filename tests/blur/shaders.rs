@@ -69,7 +69,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let (folder, file) = (part(path.parent().and_then(Path::file_name)), part(path.file_stem()));
         let shared = match folder.as_str() {
             "blur" => {
-                "base cells common filter list means meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo \
+                "base cells common covered filter list means meet mixed next node pyramid radii range show silhouette surfaces tent tiles todo \
                  work yuyv"
             }
             "stereo" => "common line path root row touch",

@@ -87,7 +87,7 @@ impl<'a> StripParts<'a> {
         Self {
             first,
             source: &slot.source,
-            decimated: slot.decimated.as_ref().filter(|_| bin.decimation > 1),
+            decimated: slot.decimated.as_ref().filter(|decimated| decimated.is_in_use()),
             cells: &slot.cells,
             edges: &slot.edges,
             out: DisjointParts::new(&mut slot.out[..used], bin.height * STRIP_ROW, out_taken),

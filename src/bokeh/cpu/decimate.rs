@@ -90,6 +90,11 @@ impl Decimated {
         self.cells = [Cells::new(bin.decimation, 0, bin.width), Cells::new(bin.decimation, phase, bin.height)];
     }
 
+    /// Whether the bin whose shape it has is decimated.
+    pub fn is_in_use(&self) -> bool {
+        self.cells[0].size > 1
+    }
+
     /// Decimates the content of a bin: each part is some rows of cells.
     pub fn run(
         &mut self,

@@ -143,9 +143,9 @@ impl CpuBokeh {
 
     /// Pass `decimate`: bin by bin.
     pub(super) fn decimate_bins(&mut self) {
-        for slot in self.slots.iter_mut().filter(|slot| slot.present) {
-            let bin = self.plan.bin_in_slot(slot.index).map(|k| &self.plan.bins[k]);
-            if let (Some(decimated), true) = (&mut slot.decimated, bin.is_some_and(|bin| bin.decimation > 1)) {
+        let plan = &self.plan;
+        for slot in self.slots.iter_mut().filter(|slot| slot.present && plan.bin_in_slot(slot.index).is_some()) {
+            if let Some(decimated) = slot.decimated.as_mut().filter(|decimated| decimated.is_in_use()) {
                 let threads = (&mut self.workers, &mut self.thread_scratch[..]);
                 decimated.run(&slot.source, threads, self.arch, &mut slot.taken[0]);
             }

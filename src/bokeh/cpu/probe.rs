@@ -19,7 +19,7 @@ impl CpuBokeh {
                     let (x, y) = (n % bin.width, n / bin.width);
                     if x % STRIP == 0 {
                         row.copy_from_slice(slot.source.row(x / STRIP, y));
-                        if let Some(decimated) = slot.decimated_rows(bin) {
+                        if let Some(decimated) = slot.decimated.as_ref().filter(|decimated| decimated.is_in_use()) {
                             decimated.recolor_line(Scalar::new(), (x / STRIP, y), 0, &mut row);
                         }
                     }

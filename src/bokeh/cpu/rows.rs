@@ -153,15 +153,15 @@ pub struct Strips {
 
 /// Columns that are copied at once.
 pub const COPY_WIDTH: usize = 16;
-/// Returns the columns beside a row that the filters of any level read, in whole pieces.
-pub fn max_pad(plan: &Plan) -> usize {
-    plan.ladder.max_half_width().next_multiple_of(COPY_WIDTH)
-}
-
 /// Values of a row of a strip.
 pub const STRIP_ROW: usize = 4 * STRIP;
 /// Values of a strip in a row of cells.
 pub const STRIP_CELLS: usize = CELL * STRIP_ROW;
+
+/// Returns the columns beside a row that the filters of any level read, in whole pieces.
+pub fn max_pad(plan: &Plan) -> usize {
+    plan.ladder.max_half_width().next_multiple_of(COPY_WIDTH)
+}
 
 impl Strips {
     /// Returns row `y` of a strip: `[4][STRIP]`.
@@ -242,11 +242,6 @@ impl Slot {
     #[inline(always)]
     pub fn is_active(&self, strip: usize, y: usize, height: usize) -> bool {
         self.active[strip * height.div_ceil(CELL) + y / CELL]
-    }
-
-    /// Returns the decimated colours of a bin; `None` if it is not decimated.
-    pub fn decimated_rows(&self, bin: &Bin) -> Option<&Decimated> {
-        self.decimated.as_ref().filter(|_| bin.decimation > 1)
     }
 
     /// Allocates zeros for the largest bin of the slot; the system provides pages only as frames touch them.

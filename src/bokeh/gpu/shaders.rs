@@ -26,10 +26,11 @@ pub const BIN: Shader = shader!(blur: "common"; "bin", "mixed", "tent", "list", 
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!(blur: "common"; "reach", "work");
 /// Mean colours of larger cells.
-pub const DECIMATE: Shader = shader!(blur: "common"; "decimate", "means", "work");
+pub const DECIMATE: Shader = shader!(blur: "common"; "decimate", "means", "covered", "work");
 /// Colours between the middles of these cells.
-pub const INTERPOLATE: Shader = shader!(blur: "common"; "interpolate", "means", "work");
-pub const BLUR_ROWS: Shader = shader!(blur: "common"; "blur_rows", "filter", "node", "list", "tiles", "todo", "next");
+pub const INTERPOLATE: Shader = shader!(blur: "common"; "interpolate", "means", "covered", "work");
+pub const BLUR_ROWS: Shader =
+    shader!(blur: "common"; "blur_rows", "covered", "filter", "node", "list", "tiles", "todo", "next");
 pub const BLUR_COLUMNS: Shader =
     shader!(blur: "common"; "blur_columns", "filter", "node", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.

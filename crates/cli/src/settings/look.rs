@@ -42,8 +42,7 @@ impl RequestedLook {
     }
 
     /// Returns the look as far as a run can have it, and logs notes on what is left out, and on a blur that is too small
-    /// for privacy. The focus that was `found` in a
-    /// photo replaces an automatic one.
+    /// for privacy. The focus that was `found` in a photo replaces an automatic one.
     ///
     /// # Errors
     /// The run cannot have what is asked for.
