@@ -49,6 +49,11 @@ fn lanes_of([red, green, blue]: &[Vec<f32>; 3], x: usize) -> [Lanes; 3] {
     [lanes_at(red, x), lanes_at(green, x), lanes_at(blue, x)]
 }
 
+/// Mask value from which a pixel is near whatever its colour, and the value up to which colours alone may make it far: an arm
+/// looks like a wall behind it, and the outline of a coarse mask is off by some pixels.
+const TRUSTED: f32 = 0.75;
+const DOUBTED: f32 = 0.65;
+
 /// Place of each lane's colour between both surfaces' (0: far, 1: near), and its reciprocal variance.
 type Discriminants = (Lanes, Lanes);
 
@@ -152,7 +157,16 @@ impl MaskView<'_> {
                 (None, None) => None,
             };
             let (alpha, precision) = match discriminants {
-                Some((places, precision)) => (posterior.alphas(&mask, &places, &precision), precision),
+                Some((places, precision)) => {
+                    let mut alpha = posterior.alphas(&mask, &places, &precision);
+                    // A loosened mask is of an outline that may be wrong.
+                    if self.given.is_none() {
+                        for k in 0..LANES {
+                            alpha[k] = fast_max(alpha[k], fast_min((mask[k] - DOUBTED) / (TRUSTED - DOUBTED), 1.0));
+                        }
+                    }
+                    (alpha, precision)
+                }
                 None => (mask, [0.0; LANES]),
             };
             buffers.alpha[x..][..LANES].copy_from_slice(&alpha);
@@ -214,5 +228,47 @@ fn add_connected((xs, y): (Range<usize>, usize), buffers: &RowBuffers, connectio
         let bits = u64::from(bits.into_iter().fold(0, |all, bits| all | bits));
         let own = u64::MAX >> (u64::BITS as usize - LANES.min(xs.end - x));
         connection.add((x, y), bits & own, bits >> LANES & own);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MaskMatting;
+    use super::{DOUBTED, TRUSTED};
+    use crate::frame::{ColorImage, DepthMap, Mask};
+
+    /// Side of a mask pixel, and size of the mask.
+    const SCALE: usize = 5;
+    const SIZE: (usize, usize) = (40, 30);
+
+    /// Returns alpha in the middle of an arm that has this value in the mask and the wall's colour, beside a body of another
+    /// one.
+    fn alpha_in_middle(value: f32) -> f32 {
+        let is_arm = |x: usize, y: usize| (20..24).contains(&x) && (10..20).contains(&y);
+        let mut mask = Mask::default();
+        mask.resize(SIZE.0 as u32, SIZE.1 as u32);
+        for (at, alpha) in mask.alpha.iter_mut().enumerate() {
+            let (x, y) = (at % SIZE.0, at / SIZE.0);
+            *alpha = if is_arm(x, y) { value } else { f32::from(x < 20) };
+        }
+        let mut color = ColorImage::new((SCALE * SIZE.0) as u32, (SCALE * SIZE.1) as u32);
+        for (at, pixel) in color.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let grain = (at * 7 % 5) as u8;
+            *pixel = if at % (SCALE * SIZE.0) < SCALE * 20 { [40 + grain; 3] } else { [200 + grain, 160, 140] };
+        }
+        let mut map = DepthMap::new(color.width, color.height);
+        map.metres.fill(DepthMap::FAR_M);
+        MaskMatting::default().compute_matte(&mask, &color, None, &mut map);
+        let at = SCALE * 15 * SCALE * SIZE.0 + SCALE * 22;
+        let mixed = map.matte.pixels.iter().find(|pixel| pixel.at as usize == at);
+        mixed.map_or(f32::from(u8::from(map.metres[at] <= DepthMap::SUBJECT_M)), |pixel| pixel.alpha)
+    }
+
+    #[test]
+    fn what_a_mask_is_sure_of_stays_and_of_what_it_doubts_colours_decide() {
+        assert_eq!([1.0, 0.9, TRUSTED].map(alpha_in_middle), [1.0; 3]);
+        let between = alpha_in_middle((TRUSTED + DOUBTED) / 2.0);
+        assert!((0.3..0.8).contains(&between), "{between}");
+        assert!([DOUBTED, 0.5, 0.2].into_iter().all(|value| alpha_in_middle(value) < 0.1));
     }
 }
