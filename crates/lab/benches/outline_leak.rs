@@ -1,5 +1,5 @@
-//! `cargo bench --bench outline_leak -- [OPTIONS]`: what of the room passes sharp through the matte of one webcam, and
-//! through the plain mask of its network.
+//! `cargo bench --bench outline_leak -- [OPTIONS]`: how right the matte of one webcam is beside the plain mask of its
+//! network, and what of the room passes sharp.
 //!
 //! The pictures are a real sequence, `rgbd/person_turning` in the folder BOKEHCAM_DATA, played back and forth; what is
 //! person and what is room tells its recorded depth. That is off by several pixels, and hair has none: the room is only
@@ -27,6 +27,8 @@ const MIN_ROOM_M: f32 = 1.8;
 const MAX_CHANGE: u8 = 16;
 /// Distances from the person beyond which the room is counted, in pixels.
 const BEYOND_PX: [i32; 3] = [0, 4, 12];
+/// Distances from the other one from which person and room count for the overlap, in pixels: recorded outlines are off.
+const MARGINS_PX: [i32; 3] = [2, 4, 7];
 
 #[derive(Parser)]
 struct Options {
@@ -51,8 +53,51 @@ fn main() -> ExitCode {
 /// A frame with its truth.
 struct Shot {
     color: ColorImage,
-    /// Per pixel, the distance from the person in pixels if it shows the room, else -1: the person, or unknown.
+    /// Per pixel, the distance from the person in pixels if it shows the room; minus the distance from all others if it
+    /// shows the person; 0 if unknown.
     room_px: Vec<i32>,
+}
+
+/// How right the alpha of the frames so far was, at each of [`MARGINS_PX`].
+#[derive(Default)]
+struct Overlap {
+    /// Sums over frames of the intersection over union, of the fractions of the person that is blurred and of the room
+    /// that is sharp, and of the mean change of alpha from frame to frame where the person stays.
+    sums: [[f64; 4]; MARGINS_PX.len()],
+    frames: usize,
+    /// Alpha, and what is the person, in the frame before.
+    before: Option<(Vec<f32>, Vec<i32>)>,
+}
+
+impl Overlap {
+    fn add(&mut self, shot: &Shot, alpha: Vec<f32>) {
+        for (sums, margin_px) in self.sums.iter_mut().zip(MARGINS_PX) {
+            let (mut persons, mut rooms, mut missed, mut spilt) = (0, 0, 0, 0);
+            let (mut stays, mut changes) = (0, 0.0);
+            for (at, (&room_px, &alpha)) in shot.room_px.iter().zip(&alpha).enumerate() {
+                let (is_person, is_room) = (room_px < -margin_px, room_px > margin_px);
+                persons += usize::from(is_person);
+                rooms += usize::from(is_room);
+                missed += usize::from(is_person && alpha <= 0.5);
+                spilt += usize::from(is_room && alpha > 0.5);
+                if let Some((before, _)) =
+                    self.before.as_ref().filter(|(_, room_px)| is_person && room_px[at] < -margin_px)
+                {
+                    (stays, changes) = (stays + 1, changes + f64::from((alpha - before[at]).abs()));
+                }
+            }
+            let ratio = |part: f64, whole: usize| part / whole.max(1) as f64;
+            let of_frame = [
+                ratio((persons - missed) as f64, persons + spilt),
+                ratio(missed as f64, persons),
+                ratio(spilt as f64, rooms),
+                ratio(changes, stays),
+            ];
+            sums.iter_mut().zip(of_frame).for_each(|(sum, value)| *sum += value);
+        }
+        self.frames += 1;
+        self.before = Some((alpha, shot.room_px.clone()));
+    }
 }
 
 /// What of the room was sharp so far, by distance from the person.
@@ -94,10 +139,11 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
     // As in a call.
     ours.set_effort(0);
     let mut leaks = ["plain mask", "matte"].map(|name| Leak { name, ..Leak::default() });
+    let mut overlaps = [Overlap::default(), Overlap::default()];
     let (mut map, mut blurred_whole, mut ever_room) = (DepthMap::default(), 0, Vec::new());
     for (index, shot) in back_and_forth(&shots).take(options.frames).enumerate() {
         let (width, at_mask) = (shot.color.width as usize, run_plain(&mut plain, &shot.color)?);
-        let person: Vec<bool> = (0..shot.room_px.len()).map(|at| shot.room_px[at] == -2).collect();
+        let person: Vec<bool> = shot.room_px.iter().map(|room_px| *room_px < 0).collect();
         ever_room.resize(person.len(), false);
         ever_room.iter_mut().zip(&shot.room_px).for_each(|(ever, room_px)| *ever |= *room_px > 0);
         let stamp = Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None };
@@ -108,6 +154,11 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
         blurred_whole += usize::from(alpha.iter().all(|alpha| *alpha == 0.0));
         let plain_count = leaks[0].add(shot, &person, |at| at_mask(at % width, at / width));
         let count = leaks[1].add(shot, &person, |at| alpha[at]);
+        // The second frame is the first one that shows a person, and each comes once.
+        if (1..shots.len()).contains(&index) {
+            overlaps[0].add(shot, (0..alpha.len()).map(|at| at_mask(at % width, at / width)).collect());
+            overlaps[1].add(shot, alpha);
+        }
         if count > options.list {
             println!("frame {index}: {count} pixels of the room are sharp, {plain_count} with the plain mask");
         }
@@ -117,6 +168,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
         "{} frames, {blurred_whole} of them blurred whole; the room is ever seen in {room} pixels",
         options.frames
     );
+    print_overlaps(&overlaps);
     println!("sharp in any frame, pixels (percent of these) | pixels in a frame | person blurred, pixels in a frame");
     for leak in &leaks {
         for (k, beyond_px) in BEYOND_PX.into_iter().enumerate() {
@@ -132,6 +184,19 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
         }
     }
     Ok(())
+}
+
+fn print_overlaps(overlaps: &[Overlap; 2]) {
+    println!(
+        "by the margin, in pixels: overlap (IoU) | person blurred | room sharp | change of alpha of the person, 1/1000"
+    );
+    for (name, Overlap { sums, frames, .. }) in ["plain mask", "matte"].into_iter().zip(overlaps) {
+        for (sums, margin_px) in sums.iter().zip(MARGINS_PX) {
+            let [overlap, missed, spilt, change] = sums.map(|sum| sum / (*frames).max(1) as f64);
+            let [missed, spilt, change] = [missed, spilt, change].map(|value| 1e3 * value);
+            println!("{name:<10} {margin_px} px: {overlap:.4} | {missed:.2} | {spilt:.2} | {change:.2}");
+        }
+    }
 }
 
 /// Iterates over the frames without end, back and forth.
@@ -190,20 +255,32 @@ fn load_shots(data: &Path) -> Result<Vec<Shot>, Box<dyn std::error::Error>> {
         });
         for Shot { color, room_px } in &mut shots {
             let is_room = (0..3).all(|p| color.rgb[3 * at + p].abs_diff(medians[p]) <= MAX_CHANGE);
-            room_px[at] = if room_px[at] > 0 && !is_room { -1 } else { room_px[at] };
+            room_px[at] = if room_px[at] > 0 && !is_room { 0 } else { room_px[at] };
         }
     }
     Ok(shots)
 }
 
-/// Returns for each pixel its distance from the person, by rows and columns, if it shows the room; -2 for the person,
-/// and -1 for unknown.
+/// Returns for each pixel of the room its distance from the person, by rows and columns; for one of the person minus the
+/// distance from all others; 0 for unknown.
 fn find_room(depth: &DepthMap) -> Vec<i32> {
-    let (width, height) = (depth.width as usize, depth.height as usize);
+    let size = (depth.width as usize, depth.height as usize);
     let is_near = |metres: f32| DepthMap::is_known(metres) && metres < MIN_ROOM_M;
-    let mut distance_px: Vec<i32> =
-        depth.metres.iter().map(|&metres| if is_near(metres) { 0 } else { 1 << 20 }).collect();
-    // A distance transform in two passes, by the larger of both directions.
+    let distances_px = |is_near_source: bool| {
+        let source = |&metres: &f32| if is_near(metres) == is_near_source { 0 } else { 1 << 20 };
+        find_distances(depth.metres.iter().map(source).collect(), size)
+    };
+    let (from_person_px, from_others_px) = (distances_px(true), distances_px(false));
+    let of_pixel = |(at, &metres): (usize, &f32)| match () {
+        () if is_near(metres) => -from_others_px[at],
+        () if DepthMap::is_known(metres) => from_person_px[at],
+        () => 0,
+    };
+    depth.metres.iter().enumerate().map(of_pixel).collect()
+}
+
+/// Completes distances that are 0 at their sources: a distance transform in two passes, by the larger of both directions.
+fn find_distances(mut distance_px: Vec<i32>, (width, height): (usize, usize)) -> Vec<i32> {
     for is_back in [false, true] {
         for k in 0..width * height {
             let at = if is_back { width * height - 1 - k } else { k };
@@ -220,10 +297,5 @@ fn find_room(depth: &DepthMap) -> Vec<i32> {
             distance_px[at] = least;
         }
     }
-    let of_pixel = |(&metres, distance_px): (&f32, i32)| match () {
-        () if is_near(metres) => -2,
-        () if DepthMap::is_known(metres) => distance_px,
-        () => -1,
-    };
-    depth.metres.iter().zip(distance_px).map(of_pixel).collect()
+    distance_px
 }
