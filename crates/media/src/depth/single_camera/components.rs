@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+/// Number of predicates of [`Components::find`].
+const PREDICATES: usize = 4;
+
 /// A component, connected by sides (4-connected).
 #[derive(Clone, Copy, Debug)]
 pub struct Component {
@@ -11,7 +14,7 @@ pub struct Component {
     /// Number of pixels.
     pub pixels: u32,
     /// Numbers of pixels that satisfy each predicate.
-    pub matches: [u32; 2],
+    pub matches: [u32; PREDICATES],
     /// Whether it touches the border of the picture.
     pub touches_border: bool,
 }
@@ -31,9 +34,9 @@ pub struct Components {
 }
 
 impl Components {
-    /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy two
-    /// predicates.
-    pub fn find(&mut self, persons: &[bool], width: usize, predicates: impl Fn(usize) -> [bool; 2]) {
+    /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy each
+    /// predicate.
+    pub fn find(&mut self, persons: &[bool], width: usize, predicates: impl Fn(usize) -> [bool; PREDICATES]) {
         let Self { runs, components } = self;
         runs.clear();
         components.clear();
@@ -49,7 +52,9 @@ impl Components {
                     parent: component,
                     is_person: same[0],
                     pixels: same.len() as u32,
-                    matches: pixels.clone().fold([0; 2], |counts, at| add(counts, predicates(at).map(u32::from))),
+                    matches: pixels
+                        .clone()
+                        .fold([0; PREDICATES], |counts, at| add(counts, predicates(at).map(u32::from))),
                     touches_border: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
                 // Runs above that end before this one are irrelevant to all later ones.
@@ -81,8 +86,8 @@ impl Components {
     }
 }
 
-fn add([a, b]: [u32; 2], [c, d]: [u32; 2]) -> [u32; 2] {
-    [a + c, b + d]
+fn add(a: [u32; PREDICATES], b: [u32; PREDICATES]) -> [u32; PREDICATES] {
+    std::array::from_fn(|k| a[k] + b[k])
 }
 
 /// Returns the root of a component.
@@ -124,7 +129,7 @@ mod tests {
         ];
         let persons: Vec<bool> = picture.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let mut components = Components::default();
-        components.find(&persons, 10, |at| [at % 10 < 5, false]);
+        components.find(&persons, 10, |at| [at % 10 < 5, false, false, false]);
         let mut matches: Vec<_> = components
             .iter_all()
             .map(|part| (part.is_person, part.pixels, part.matches[0], part.touches_border))

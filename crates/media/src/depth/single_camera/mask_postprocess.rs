@@ -3,7 +3,8 @@
 //! A mask value between 0 and 1 has two meanings: on an outline, a mixed pixel; elsewhere, an unsure network. Away from
 //! outlines, no pixel is half a person, so each is decided either way. An enclosed hole of which the network is unsure
 //! is filled; a region of which it is mostly unsure is no person. In a live picture, a region that was not there in the
-//! mask before is background, too: what shows a room to others takes two masks that agree.
+//! mask before is background, too: what shows a room to others takes two masks that agree. What rests completely while
+//! a person moves is an object, such as a rucksack on a chair.
 
 use super::components::Components;
 use bokehcam::frame::Mask;
@@ -37,6 +38,9 @@ pub struct MaskPostProcessor {
     sure: Vec<bool>,
     /// Whether a sure region waits for a second mask.
     is_waiting: bool,
+    /// Whether a pixel's place has long been at rest, and whether it was in a region taken for an object; empty if unknown.
+    at_rest: Vec<bool>,
+    objects: Vec<bool>,
     components: Components,
     /// Vertical sums of person pixels around each pixel of a row, within 1 and within [`RADIUS`], from [`RADIUS`] pixels
     /// beyond the border on.
@@ -47,7 +51,14 @@ impl MaskPostProcessor {
     /// Resets the state, for a new scene.
     pub fn reset(&mut self) {
         self.previous.clear();
+        self.objects.clear();
         self.is_waiting = false;
+    }
+
+    /// Sets which pixels of the next mask have long been at rest. Without this call, nothing counts as that.
+    pub fn set_at_rest(&mut self, at_rest: impl Iterator<Item = bool>) {
+        self.at_rest.clear();
+        self.at_rest.extend(at_rest);
     }
 
     /// Whether the last mask had a sure region that takes a second mask to be a person.
@@ -61,12 +72,18 @@ impl MaskPostProcessor {
         decided.clone_from(mask);
         self.classify_pixels(&mask.alpha);
         let width = mask.width as usize;
-        let Self { persons, previous, sure_before, components, .. } = self;
+        let Self { persons, previous, sure_before, at_rest, objects, components, .. } = self;
+        at_rest.resize(persons.len(), false);
+        if objects.len() != persons.len() {
+            objects.clear();
+            objects.resize(persons.len(), false);
+        }
         components.find(persons, width, |at| match persons[at] {
-            true => [own[at] > MIN_SURE_ALPHA, sure_before[at]],
-            false => [own[at] < SURE_HOLE_ALPHA[usize::from(previous[at])], false],
+            true => [own[at] > MIN_SURE_ALPHA, sure_before[at], !at_rest[at], objects[at]],
+            false => [own[at] < SURE_HOLE_ALPHA[usize::from(previous[at])], false, false, false],
         });
         self.drop_unsure_regions(takes_two);
+        self.drop_objects();
         self.fill_holes();
         self.binarize_interior(width, &mut decided.alpha);
         std::mem::swap(&mut self.persons, &mut self.previous);
@@ -97,7 +114,7 @@ impl MaskPostProcessor {
         sure.clear();
         sure.resize(persons.len(), false);
         for (run, component) in components.runs().filter(|(_, component)| component.is_person) {
-            let [sure_pixels, known_pixels] = component.matches.map(|count| count as f32);
+            let [sure_pixels, known_pixels, ..] = component.matches.map(|count| count as f32);
             let pixels = component.pixels as f32;
             let is_known = known_pixels >= MIN_AGREEING_FRACTION * pixels;
             let is_sure = pixels > least && sure_pixels >= MIN_SURE_FRACTION[usize::from(is_known)] * pixels;
@@ -105,6 +122,27 @@ impl MaskPostProcessor {
             self.is_waiting |= is_waiting;
             sure[run.clone()].fill(is_sure);
             persons[run].fill(is_sure && !is_waiting);
+        }
+    }
+
+    /// Makes regions background that rest completely while a person moves, and from then on until they move. The largest
+    /// region stays a person.
+    fn drop_objects(&mut self) {
+        let Self { persons, objects, components, .. } = self;
+        let (mut is_one_moving, mut largest) = (false, 0);
+        for (_, component) in
+            components.runs().filter(|(run, component)| persons[run.start] && component.matches[3] == 0)
+        {
+            is_one_moving |= component.matches[2] > 0;
+            largest = largest.max(component.pixels);
+        }
+        for (run, component) in components.runs().filter(|(_, component)| component.is_person) {
+            let [_, _, moving, known_objects] = component.matches;
+            let is_object = moving == 0 && (known_objects > 0 || is_one_moving && component.pixels < largest);
+            objects[run.clone()].fill(is_object);
+            if is_object {
+                persons[run].fill(false);
+            }
         }
     }
 
@@ -276,5 +314,25 @@ mod tests {
             _ => body(x, y),
         });
         assert_eq!(sharp_pixels(false, &[&chair]), [32 * 40]);
+    }
+
+    #[test]
+    fn what_rests_while_a_person_moves_is_an_object_until_it_moves_itself() {
+        let rucksack = |x: usize, y: usize| x < 10 && y >= 30;
+        let both = mask(|x, y| if rucksack(x, y) { 1.0 } else { body(x, y) });
+        let alone = mask(|x, y| f32::from(u8::from(rucksack(x, y))));
+        let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
+        let mut sharp = |mask: &Mask, at_rest: &dyn Fn(usize, usize) -> bool| {
+            postprocessor.set_at_rest((0..SIZE.0 * SIZE.1).map(|at| at_rest(at % SIZE.0, at / SIZE.0)));
+            postprocessor.postprocess(mask, &mask.alpha, false, &mut decided);
+            [decided.alpha[40 * SIZE.0 + 4], decided.alpha[40 * SIZE.0 + 32]]
+        };
+        assert_eq!(sharp(&both, &|_, _| true), [1.0, 1.0], "all at rest: a photo, or persons who hold still");
+        assert_eq!(sharp(&both, &|_, _| false), [1.0, 1.0]);
+        assert_eq!(sharp(&both, &rucksack), [0.0, 1.0]);
+        assert_eq!(sharp(&alone, &|_, _| true), [0.0, 0.0], "the person left");
+        assert_eq!(sharp(&both, &|_, _| true), [0.0, 1.0], "and is back, and holds still");
+        assert_eq!(sharp(&both, &|x, _| x > 2), [1.0, 1.0], "part of it moves");
+        assert_eq!(sharp(&both, &|_, _| true), [1.0, 1.0]);
     }
 }

@@ -9,6 +9,8 @@ use bokehcam::frame::{ColorImage, Mask};
 /// Weight of the previous frame for an undecided pixel at 30 frames a second; it decreases with longer gaps.
 const PREVIOUS_WEIGHT: f32 = 0.8;
 const FRAME_NS: f32 = 1e9 / 30.0;
+/// Number of pictures without any change after which a place is at rest, about a minute: who breathes is not.
+const MIN_REST_PICTURES: u32 = 1800;
 /// Lower mask values are 0: those of a sure network are so small that arithmetic with them is slow.
 const MIN_ALPHA: f32 = 1e-6;
 
@@ -86,6 +88,9 @@ impl PersonSegmenter {
         self.smoothed.resize(size.0, size.1);
         Arch::new().dispatch(Smooth { new: &self.decoded, previous_weight, smoothed: &mut self.smoothed.alpha });
         self.seen_ns = Some(time_ns);
+        let network = &self.picture_network;
+        let rests = |at| network.rested_pictures(at, (size.0 as usize, size.1 as usize)) >= MIN_REST_PICTURES;
+        self.mask_postprocess.set_at_rest((0..self.smoothed.alpha.len()).map(rests));
         self.mask_postprocess.postprocess(&self.smoothed, &self.decoded, takes_two, &mut self.mask);
         Ok(())
     }

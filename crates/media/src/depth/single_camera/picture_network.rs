@@ -171,6 +171,13 @@ impl PictureNetwork {
         self.stillness.as_mut().is_some_and(StillnessDetector::is_still)
     }
 
+    /// Returns for how many pictures the place of pixel `at` of an output of this size (columns, rows) has not changed; 0 if
+    /// that is not watched.
+    pub fn rested_pictures(&self, at: usize, (width, height): (usize, usize)) -> u32 {
+        let (x, y) = (at % width * self.size.0 / width, at / width * self.size.1 / height);
+        self.stillness.as_ref().map_or(0, |stillness| stillness.rested_pictures((x, y), self.size.0))
+    }
+
     /// Runs the network on the picture set by [`Self::set_picture`].
     ///
     /// # Errors

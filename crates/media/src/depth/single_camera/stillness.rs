@@ -40,6 +40,8 @@ pub struct StillnessDetector {
     noise: [f32; 2],
     /// Pictures since the last run; `None` before the first.
     skipped: Option<u32>,
+    /// Each tile's luma and chroma at its last change, and the pictures since.
+    rests: Vec<([f32; 3], u32)>,
 }
 
 impl StillnessDetector {
@@ -47,12 +49,27 @@ impl StillnessDetector {
     pub fn new((width, height): (usize, usize)) -> Self {
         let most = width.div_ceil(TILE) * height.div_ceil(TILE);
         let [now, before, run] = [(); 3].map(|()| Vec::with_capacity(most));
-        Self { sums: vec![0; width * 3], height, now, before, run, noise: [0.0; 2], skipped: None }
+        Self {
+            sums: vec![0; width * 3],
+            height,
+            now,
+            before,
+            run,
+            noise: [0.0; 2],
+            skipped: None,
+            rests: Vec::with_capacity(most),
+        }
     }
 
     /// Forgets the last run, for a new scene.
     pub fn reset(&mut self) {
         self.skipped = None;
+        self.rests.clear();
+    }
+
+    /// Returns for how many pictures the place (`x`, `y`) of an input `width` columns wide has not changed.
+    pub fn rested_pictures(&self, (x, y): (usize, usize), width: usize) -> u32 {
+        self.rests.get(y / TILE * width.div_ceil(TILE) + x / TILE).map_or(0, |(_, pictures)| *pictures)
     }
 
     /// Adds row `y` of an input, 8-bit RGB; rows come in order.
@@ -94,6 +111,13 @@ impl StillnessDetector {
         };
         let bounds = [bound(0), bound(1), bound(1)];
         let differs = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|plane| (a[plane] - b[plane]).abs() > bounds[plane]);
+        self.rests.resize(self.now.len(), ([0.0; 3], 0));
+        for ((before, pictures), now) in self.rests.iter_mut().zip(&self.now) {
+            match differs((now, before)) {
+                true => (*before, *pictures) = (*now, 0),
+                false => *pictures += 1,
+            }
+        }
         let is_due = self.skipped.is_none_or(|skipped| skipped >= MAX_SKIPPED) || self.run.len() != self.now.len();
         let runs = is_due || self.now.iter().zip(&self.run).any(differs);
         if runs {
