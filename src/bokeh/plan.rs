@@ -39,7 +39,7 @@ pub const CELL: usize = 8;
 /// Bin pixels between two segment edges, where the radius is sampled; it is linear between them.
 pub const SEGMENT: usize = 16;
 /// Largest number of bins, so that both executors can use fixed arrays.
-pub const MAX_BINS: usize = 13;
+pub const MAX_BINS: usize = 11;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const MIN_COVERAGE: f32 = 1e-3;
 
