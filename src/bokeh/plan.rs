@@ -27,7 +27,7 @@ pub use privacy::{CELL_SHARPNESS, min_private_radius_px};
 use super::bank::{FilterBank, compensated_radius_px};
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
-use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, scale_within};
+use super::quality_level::{MAX_FULL_RADIUS_PX, NEAR_FROM_FRACTION, NEAR_FROM_PX, QualityLevel, SCALES, scale_within};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -232,7 +232,7 @@ impl Plan {
 
     /// Returns the radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
     pub fn near_from_px(&self) -> f32 {
-        self.level.near_from_px.max(self.level.near_from_fraction * self.max_px[0])
+        NEAR_FROM_PX.max(NEAR_FROM_FRACTION * self.max_px[0])
     }
 
     fn plan_layers(&mut self) {

@@ -11,10 +11,15 @@ pub const MAX_FULL_RADIUS_PX: f32 = 128.0;
 /// The smallest CoC at which a bin of its own begins, in pixels.
 pub const FOCUS_BORDER_PX: f32 = 1.0;
 
+/// Radius in front of the focal plane below which everything belongs to the bin in focus, in pixels, and as a fraction
+/// of the largest radius behind; the larger one applies, so that a nose is no layer of its own.
+pub const NEAR_FROM_PX: f32 = 2.0;
+pub const NEAR_FROM_FRACTION: f32 = 0.07;
+
 /// Parameters of a quality level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualityLevel {
-    /// Time of a frame relative to the default level, measured on two cores with a person in a room. Other pictures and
+    /// Time of a frame relative to the default level, measured on scenes of a person before walls. Other pictures and
     /// machines differ: this is a first estimate, from which the governor learns.
     pub cost: f64,
     /// Separable terms of each bin's filters.
@@ -24,11 +29,6 @@ pub struct QualityLevel {
     /// Number of bins of a side, the first ones, that may be at full scale, where filters cost most; the others begin
     /// only where half scale does, so that few of them divide a slope whose radii are all below that.
     pub fine_bins: usize,
-    /// Radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
-    pub near_from_px: f32,
-    /// Same limit as a fraction of the largest radius behind; the larger one applies, so that a nose is no layer of its
-    /// own.
-    pub near_from_fraction: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which each of [`SCALES`] is used.
     pub scale_from_px: [f32; SCALES.len()],
     /// Largest radius in bin pixels: a bin is reduced until its radii fit, so that the cost of a filter does not grow
@@ -45,8 +45,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = [
         rank: 2,
         bins_per_side: 2,
         fine_bins: 1,
-        near_from_px: 2.5,
-        near_from_fraction: 0.07,
         scale_from_px: [0.0, 2.5, 15.0, 30.0],
         max_bin_radius_px: 14.0,
         uniform_rank: 2,
@@ -56,8 +54,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = [
         rank: 3,
         bins_per_side: 4,
         fine_bins: 1,
-        near_from_px: 2.0,
-        near_from_fraction: 0.07,
         scale_from_px: [0.0, 4.0, 15.0, 30.0],
         max_bin_radius_px: 14.0,
         uniform_rank: 4,
@@ -67,8 +63,6 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = [
         rank: 4,
         bins_per_side: 5,
         fine_bins: 3,
-        near_from_px: FOCUS_BORDER_PX,
-        near_from_fraction: 0.0,
         scale_from_px: [0.0, 12.0, 48.0, 96.0],
         max_bin_radius_px: 28.0,
         uniform_rank: 6,
@@ -77,12 +71,8 @@ pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = [
 
 /// [`QualityLevel::cost`] of all levels, as the governor takes them.
 pub const COSTS: [f64; QUALITY_LEVELS.len()] = {
-    let (mut costs, mut level) = ([0.0; QUALITY_LEVELS.len()], 0);
-    while level < QUALITY_LEVELS.len() {
-        costs[level] = QUALITY_LEVELS[level].cost;
-        level += 1;
-    }
-    costs
+    let [draft, balanced, best] = QUALITY_LEVELS;
+    [draft.cost, balanced.cost, best.cost]
 };
 
 /// Returns the finest scale at which a radius has at most `max_px` bin pixels, or the coarsest scale.
