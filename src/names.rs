@@ -20,13 +20,15 @@ pub trait Named: Copy + PartialEq + 'static {
     fn former_names(self) -> &'static [&'static str];
 }
 
-/// Parses the name of a value. Warns of a former name.
+/// Parses the name of a value. Warns of a former name once, as a text is parsed several times.
 ///
 /// # Errors
 /// No value has this name; the message lists the accepted names.
 pub fn parse_name<T: Named>(text: &str) -> Result<T, String> {
-    if let Some(line) = describe_former_name::<T>(text) {
-        warn_once(line);
+    if let Some(line) = describe_former_name::<T>(text)
+        && FORMER_NAMES.lock().is_ok_and(|mut warned| warned.insert(line.clone()))
+    {
+        tracing::warn!("{line}");
     }
     let is_meant = |value: &T| value.name() == text || value.former_names().contains(&text);
     T::VALUES.iter().copied().find(is_meant).ok_or_else(|| {
@@ -53,13 +55,6 @@ pub fn describe_former_name<T: Named>(text: &str) -> Option<String> {
 
 /// Lines on the former names that were parsed so far.
 static FORMER_NAMES: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-
-/// Logs a warning once, as a text is parsed several times.
-fn warn_once(line: String) {
-    if FORMER_NAMES.lock().is_ok_and(|mut warned| warned.insert(line.clone())) {
-        tracing::warn!("{line}");
-    }
-}
 
 /// Logs the warnings of former names again: for a logger that starts after the command line is parsed.
 pub fn repeat_warnings() {
