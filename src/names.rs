@@ -1,7 +1,10 @@
 //! Enumerations whose values have the same names on the command line, in files and in the window; and suggestions for
 //! misspelt names.
 
+use std::any::type_name;
+use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::sync::Mutex;
 
 /// An enumeration whose values have names.
 pub trait Named: Copy + PartialEq + 'static {
@@ -12,14 +15,23 @@ pub trait Named: Copy + PartialEq + 'static {
 
     /// Returns a one-line description of the value.
     fn help(self) -> &'static str;
+
+    /// Returns the names of earlier versions that mean this value now: they are accepted, but not listed.
+    fn former_names(self) -> &'static [&'static str];
 }
 
-/// Parses the name of a value.
+/// Parses the name of a value. Warns of a former name once, as a text is parsed several times.
 ///
 /// # Errors
 /// No value has this name; the message lists the accepted names.
 pub fn parse_name<T: Named>(text: &str) -> Result<T, String> {
-    T::VALUES.iter().copied().find(|value| value.name() == text).ok_or_else(|| {
+    if let Some(line) = describe_former_name::<T>(text)
+        && FORMER_NAMES.lock().is_ok_and(|mut warned| warned.insert(line.clone()))
+    {
+        tracing::warn!("{line}");
+    }
+    let is_meant = |value: &T| value.name() == text || value.former_names().contains(&text);
+    T::VALUES.iter().copied().find(is_meant).ok_or_else(|| {
         let mut accepted = String::from("use ");
         for (k, value) in T::VALUES.iter().enumerate() {
             let separator = match k {
@@ -32,6 +44,21 @@ pub fn parse_name<T: Named>(text: &str) -> Result<T, String> {
         }
         accepted
     })
+}
+
+/// Returns a line on what a former name means now; `None` for any other text.
+pub fn describe_former_name<T: Named>(text: &str) -> Option<String> {
+    let value = T::VALUES.iter().find(|value| value.former_names().contains(&text))?;
+    let kind = type_name::<T>().rsplit("::").next().unwrap_or_default().to_lowercase();
+    Some(format!("{kind} {text} is called {} now", value.name()))
+}
+
+/// Lines on the former names that were parsed so far.
+static FORMER_NAMES: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+/// Logs the warnings of former names again: for a logger that starts after the command line is parsed.
+pub fn repeat_warnings() {
+    FORMER_NAMES.lock().iter().flat_map(|lines| lines.iter()).for_each(|line| tracing::warn!("{line}"));
 }
 
 /// Smallest Jaro-Winkler similarity (0 to 1) of a suggestion: one or two typos in a word of usual length.
@@ -48,12 +75,13 @@ pub fn find_similar<N: AsRef<str>>(name: &str, names: impl IntoIterator<Item = N
     rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
 }
 
-/// Implements [`Named`] for an enumeration: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.
+/// Implements [`Named`] for an enumeration: `named! { pub enum Name default Value { /// help Value = "value" once
+/// "former name", ... } }`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named {
     ($(#[$meta:meta])* $vis:vis enum $name:ident default $default:ident {
-        $($(#[doc = $help:literal])+ $value:ident = $text:literal),+ $(,)?
+        $($(#[doc = $help:literal])+ $value:ident = $text:literal $(once $former:literal)*),+ $(,)?
     }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -78,6 +106,10 @@ macro_rules! named {
 
             fn help(self) -> &'static str {
                 match self { $(Self::$value => concat!($($help),+).trim_start()),+ }
+            }
+
+            fn former_names(self) -> &'static [&'static str] {
+                match self { $(Self::$value => &[$($former),*]),+ }
             }
         }
 
@@ -113,11 +145,11 @@ mod tests {
             /// sweet
             Ice = "ice-cream",
             /// For birds
-            Seed = "seed",
+            Seed = "seed" once "corn" once "grain",
         }
     }
 
-    use super::Named;
+    use super::{Named, describe_former_name};
 
     #[test]
     fn values_are_read_as_they_are_written() {
@@ -126,5 +158,12 @@ mod tests {
         }
         assert_eq!((Meal::default(), Meal::Ice.help()), (Meal::Tea, "Cold, sweet"));
         assert_eq!("Tea".parse::<Meal>(), Err("use tea, ice-cream or seed".to_string()));
+    }
+
+    #[test]
+    fn former_names_are_read_and_explained() {
+        assert_eq!(["corn", "grain"].map(str::parse), [Ok(Meal::Seed), Ok(Meal::Seed)]);
+        assert_eq!(describe_former_name::<Meal>("corn").unwrap(), "meal corn is called seed now");
+        assert_eq!(["seed", "wheat"].map(describe_former_name::<Meal>), [None, None]);
     }
 }

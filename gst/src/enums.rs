@@ -13,15 +13,21 @@ fn leak_c_string(text: &str) -> *const std::ffi::c_char {
     CString::new(text).unwrap_or_default().into_raw()
 }
 
-/// Registers an enumeration; its values are the indices of `choices`.
+/// Registers an enumeration; its values are the indices of `choices`. Former names follow: they set the same values,
+/// which are read by the present names, as those come first.
 pub fn register(name: &str, choices: &[Choice]) -> glib::Type {
-    let value = |(place, &(nick, help)): (usize, &Choice)| gobject_ffi::GEnumValue {
+    let value = |place: usize, nick: &str, help: &str| gobject_ffi::GEnumValue {
         value: place as i32,
         value_name: leak_c_string(if help.is_empty() { nick } else { help }),
         value_nick: leak_c_string(nick),
     };
+    let present = choices.iter().enumerate().map(|(place, choice)| value(place, choice.name, choice.help));
+    let former = choices.iter().enumerate().flat_map(|(place, choice)| {
+        let help = format!("Is called {} now", choice.name);
+        choice.former_names.iter().map(move |former| value(place, former, &help))
+    });
     let end = gobject_ffi::GEnumValue { value: 0, value_name: ptr::null(), value_nick: ptr::null() };
-    let values: Vec<_> = choices.iter().enumerate().map(value).chain([end]).collect();
+    let values: Vec<_> = present.chain(former).chain([end]).collect();
     let values = Box::leak(values.into_boxed_slice());
     // SAFETY: the name is copied; the values, terminated by one of zeros, and their texts are never freed or changed.
     // Each property is created once, so no type is registered twice.

@@ -112,7 +112,7 @@ fn setting_spec(setting: &Setting) -> glib::ParamSpec {
     let (nick, help) = (format_nick(name), as_properties(setting.help.trim()));
     let choices = (setting.choices)();
     if !choices.is_empty() {
-        let place = default.and_then(|default| choices.iter().position(|choice| choice.0 == default));
+        let place = default.and_then(|default| choices.iter().position(|choice| choice.name == default));
         let type_name = format!("GstBokeh{}", nick.split(' ').map(capitalise).collect::<String>());
         let type_ = enums::register(&type_name, &choices);
         let flags = glib::ParamFlags::READWRITE | gst::PARAM_FLAG_CONTROLLABLE | gst::PARAM_FLAG_MUTABLE_PLAYING;

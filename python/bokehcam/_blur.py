@@ -44,7 +44,7 @@ def blur(
         aperture: The lens opening: a name as on the command line, or what :func:`bokehcam.aperture` gives.
         rim: Width of the soft rim as a fraction of the radius, 0 to 1; the aperture's (0.2) unless given.
         intensity: Radial intensity, -1 to 1; the aperture's (0) unless given.
-        quality: ``draft``, ``fast``, ``balanced``, ``high`` or ``best``: changes fidelity, never the amount of blur.
+        quality: ``draft``, ``balanced`` or ``best``: changes fidelity, never the amount of blur.
         rank: Separable terms, 1 to 16 or ``"full"``; the quality's unless given.
         highlights: Takes clipped white of ``uint8`` pictures as this many times as bright, 0 to 1000; 0 is off.
         method: ``layered``, or ``gather``: the paper's plain form, for comparison.

@@ -1,11 +1,14 @@
 //! Errors as Python exceptions.
 
+use std::ffi::CString;
 use std::fmt::Display;
 
+use bokehcam::budget::Quality;
 use bokehcam::look::settings::find_setting;
 use bokehcam::look::{Look, Patch};
-use pyo3::PyErr;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use bokehcam::names::describe_former_name;
+use pyo3::exceptions::{PyFutureWarning, PyOSError, PyValueError};
+use pyo3::{PyErr, Python};
 
 /// Converts a library error to a `ValueError`. Its messages name command-line flags, which are arguments here.
 pub fn value(error: impl Display) -> PyErr {
@@ -37,6 +40,11 @@ pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
         if let Some((other, _)) = settings.iter().find(|(other, _)| excluded.contains(&other.as_str())) {
             return Err(value(format!("--{name} and --{other} exclude each other: leave one of them out")));
         }
+    }
+    let former = settings.iter().find(|(name, _)| name == "quality");
+    if let Some(line) = former.and_then(|(_, level)| describe_former_name::<Quality>(level)) {
+        let line = CString::new(line).map_err(value)?;
+        Python::attach(|py| PyErr::warn(py, &py.get_type::<PyFutureWarning>(), &line, 1))?;
     }
     let patch = Patch::parse(pairs).map_err(|(name, what)| value(format!("--{name}: {what}")))?;
     patch.apply_to(&Look::default()).map_err(value)

@@ -124,7 +124,7 @@ def test_radii_that_do_not_fit_are_refused(image, coc):
 
 
 @pytest.mark.parametrize("settings, says", [
-    ({"quality": "superb"}, "quality: use draft, fast, balanced, high or best"),
+    ({"quality": "superb"}, "quality: use draft, balanced or best"),
     ({"aperture": "circle"}, "aperture: use disc"),
     ({"rank": 17}, "rank: use 1 to 16, or full"),
     ({"rim": 1.5}, "rim: use a number from 0 to 1"),
@@ -138,6 +138,13 @@ def test_radii_that_do_not_fit_are_refused(image, coc):
 def test_settings_that_are_none_are_refused(settings, says):
     with pytest.raises(ValueError, match=says):
         bc.Renderer(**{"size": (WIDTH, HEIGHT), **settings})
+
+
+@pytest.mark.parametrize("former, now", [("fast", "draft"), ("high", "balanced")])
+def test_a_former_name_is_taken_with_a_warning(image, coc, former, now):
+    with pytest.warns(FutureWarning, match=f"quality {former} is called {now} now"):
+        blurred = bc.blur(image, coc, quality=former)
+    np.testing.assert_array_equal(blurred, bc.blur(image, coc, quality=now))
 
 
 def test_highlights_are_of_pictures_that_are_clipped(image, coc):

@@ -92,7 +92,7 @@ def test_threads_that_share_a_renderer_take_turns():
 
 def test_a_renderer_can_be_pickled():
     image, coc = frame()
-    renderer = bc.Renderer(SIZE, bc.polygon(5, rim=0.1), "fast", 2, rank=3, max_coc_px=(10, 12))
+    renderer = bc.Renderer(SIZE, bc.polygon(5, rim=0.1), "draft", 2, rank=3, max_coc_px=(10, 12))
     again = pickle.loads(pickle.dumps(renderer))
     assert repr(again) == repr(renderer)
     np.testing.assert_array_equal(again(image, coc), renderer(image, coc))

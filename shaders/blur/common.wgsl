@@ -37,7 +37,7 @@ override RESULT_TILE_X: u32;
 override RESULT_TILE_Y: u32;
 override SHARED_FROM_SCALE: u32;    // scale from which four threads of pass bin share a pixel
 
-const MAX_BINS = 13;
+const MAX_BINS = 11;
 const MIXED_FLAG = 0x8000u; // flag of a scene pixel: see pack_scene
 
 // One frame.

@@ -103,6 +103,6 @@ impl QualityLadder {
 
     /// Returns the largest number of bins per side that may be at full scale.
     pub fn max_fine_bins(&self) -> usize {
-        self.levels.iter().map(|level| level.level.fine_bins()).max().unwrap_or(0)
+        self.levels.iter().map(|level| level.level.fine_bins).max().unwrap_or(0)
     }
 }

@@ -27,7 +27,7 @@ pub use privacy::{CELL_SHARPNESS, min_private_radius_px};
 use super::bank::{FilterBank, compensated_radius_px};
 pub use super::bin_weight::BinWeight;
 use super::ladder::{Compositing, QualityLadder};
-use super::quality_level::{MAX_FULL_RADIUS_PX, QualityLevel, SCALES, scale_within};
+use super::quality_level::{MAX_FULL_RADIUS_PX, NEAR_FROM_FRACTION, NEAR_FROM_PX, QualityLevel, SCALES, scale_within};
 use super::split::{CROSS_FADE, CocHistogram, CocRange, MAX_RANGES, geometric_ranges};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
@@ -39,7 +39,7 @@ pub const CELL: usize = 8;
 /// Bin pixels between two segment edges, where the radius is sampled; it is linear between them.
 pub const SEGMENT: usize = 16;
 /// Largest number of bins, so that both executors can use fixed arrays.
-pub const MAX_BINS: usize = 13;
+pub const MAX_BINS: usize = 11;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const MIN_COVERAGE: f32 = 1e-3;
 
@@ -232,7 +232,7 @@ impl Plan {
 
     /// Returns the radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
     pub fn near_from_px(&self) -> f32 {
-        self.level.near_from_px.max(self.level.near_from_fraction * self.max_px[0])
+        NEAR_FROM_PX.max(NEAR_FROM_FRACTION * self.max_px[0])
     }
 
     fn plan_layers(&mut self) {

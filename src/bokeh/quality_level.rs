@@ -11,21 +11,24 @@ pub const MAX_FULL_RADIUS_PX: f32 = 128.0;
 /// The smallest CoC at which a bin of its own begins, in pixels.
 pub const FOCUS_BORDER_PX: f32 = 1.0;
 
+/// Radius in front of the focal plane below which everything belongs to the bin in focus, in pixels, and as a fraction
+/// of the largest radius behind; the larger one applies, so that a nose is no layer of its own.
+pub const NEAR_FROM_PX: f32 = 2.0;
+pub const NEAR_FROM_FRACTION: f32 = 0.07;
+
 /// Parameters of a quality level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualityLevel {
-    /// Time of a frame relative to the default level, measured on two cores with a person in a room. Other pictures and
+    /// Time of a frame relative to the default level, measured on scenes of a person before walls. Other pictures and
     /// machines differ: this is a first estimate, from which the governor learns.
     pub cost: f64,
     /// Separable terms of each bin's filters.
     pub rank: u32,
     /// Number of bins behind the focal plane, and in front of it.
     pub bins_per_side: u32,
-    /// Radius in front of the focal plane below which everything belongs to the bin in focus, in pixels.
-    pub near_from_px: f32,
-    /// Same limit as a fraction of the largest radius behind; the larger one applies, so that a nose is no layer of its
-    /// own.
-    pub near_from_fraction: f32,
+    /// Number of bins of a side, the first ones, that may be at full scale, where filters cost most; the others begin
+    /// only where half scale does, so that few of them divide a slope whose radii are all below that.
+    pub fine_bins: usize,
     /// Smallest radius in a bin, in pixels of the picture, from which each of [`SCALES`] is used.
     pub scale_from_px: [f32; SCALES.len()],
     /// Largest radius in bin pixels: a bin is reduced until its radii fit, so that the cost of a filter does not grow
@@ -36,59 +39,40 @@ pub struct QualityLevel {
 }
 
 /// Quality levels, cheapest first, in the order of [`Quality::ALL`].
-pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = {
-    let fast = QualityLevel {
-        cost: 0.70,
+pub const QUALITY_LEVELS: [QualityLevel; Quality::ALL.len()] = [
+    QualityLevel {
+        cost: 0.8,
         rank: 2,
         bins_per_side: 2,
-        near_from_px: 2.5,
-        near_from_fraction: 0.07,
+        fine_bins: 1,
         scale_from_px: [0.0, 2.5, 15.0, 30.0],
         max_bin_radius_px: 14.0,
-        uniform_rank: 3,
-    };
-    [
-        QualityLevel { cost: 0.68, uniform_rank: 2, ..fast },
-        fast,
-        QualityLevel {
-            cost: 1.0,
-            rank: 3,
-            bins_per_side: 3,
-            near_from_px: 2.0,
-            scale_from_px: [0.0, 3.5, 15.0, 30.0],
-            uniform_rank: 4,
-            ..fast
-        },
-        QualityLevel {
-            cost: 1.3,
-            rank: 4,
-            bins_per_side: 4,
-            near_from_px: 1.5,
-            scale_from_px: [0.0, 4.5, 18.0, 36.0],
-            uniform_rank: 4,
-            ..fast
-        },
-        QualityLevel {
-            cost: 2.2,
-            rank: 4,
-            bins_per_side: 6,
-            near_from_px: FOCUS_BORDER_PX,
-            near_from_fraction: 0.0,
-            scale_from_px: [0.0, 16.0, 48.0, 96.0],
-            max_bin_radius_px: 28.0,
-            uniform_rank: 6,
-        },
-    ]
-};
+        uniform_rank: 2,
+    },
+    QualityLevel {
+        cost: 1.0,
+        rank: 3,
+        bins_per_side: 4,
+        fine_bins: 1,
+        scale_from_px: [0.0, 4.0, 15.0, 30.0],
+        max_bin_radius_px: 14.0,
+        uniform_rank: 4,
+    },
+    QualityLevel {
+        cost: 2.2,
+        rank: 4,
+        bins_per_side: 5,
+        fine_bins: 3,
+        scale_from_px: [0.0, 12.0, 48.0, 96.0],
+        max_bin_radius_px: 28.0,
+        uniform_rank: 6,
+    },
+];
 
 /// [`QualityLevel::cost`] of all levels, as the governor takes them.
 pub const COSTS: [f64; QUALITY_LEVELS.len()] = {
-    let (mut costs, mut level) = ([0.0; QUALITY_LEVELS.len()], 0);
-    while level < QUALITY_LEVELS.len() {
-        costs[level] = QUALITY_LEVELS[level].cost;
-        level += 1;
-    }
-    costs
+    let [draft, balanced, best] = QUALITY_LEVELS;
+    [draft.cost, balanced.cost, best.cost]
 };
 
 /// Returns the finest scale at which a radius has at most `max_px` bin pixels, or the coarsest scale.
@@ -98,11 +82,6 @@ pub fn scale_within(radius_px: f32, max_px: f32) -> usize {
 }
 
 impl QualityLevel {
-    /// Returns the number of bins of a side that may be at full scale, where filters cost most: about a third.
-    pub fn fine_bins(&self) -> usize {
-        (self.bins_per_side as usize + 1) / 3
-    }
-
     /// Returns the scale of a bin with radii from `low_px` to `high_px`: the coarsest at which the small ones keep
     /// their shape, or a coarser one that keeps the large ones cheap.
     pub fn scale(&self, low_px: f32, high_px: f32) -> usize {

@@ -98,7 +98,7 @@ impl CocHistogram {
             for to in first + j + 1..=last + 1 {
                 for from in first + j..to {
                     // A range begins with pixels. Only the first ranges may need full scale, which is expensive.
-                    if side[from] == 0 || j >= level.fine_bins() && bucket_edge_px(from) < level.scale_from_px[1] {
+                    if side[from] == 0 || j >= level.fine_bins && bucket_edge_px(from) < level.scale_from_px[1] {
                         continue;
                     }
                     let cost = best[j - 1][from].0 + variance(from, to) + BIN_COST;
@@ -211,7 +211,7 @@ fn place_of(coc_px: f32) -> u32 {
 }
 
 /// Largest number of ranges per side.
-pub const MAX_RANGES: usize = 6;
+pub const MAX_RANGES: usize = 5;
 
 /// Returns the variance of ln |c| over the buckets `from..to`, times their fraction of the picture.
 fn variance_between(sums: &[[f64; 3]; BUCKETS + 1], from: usize, to: usize) -> f64 {

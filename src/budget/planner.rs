@@ -15,7 +15,7 @@ const MAX_FRAMES_PER_MAP: usize = 3;
 const EFFORT_PENALTY: f64 = 2.0;
 const SHARING_PENALTIES: [f64; MAX_FRAMES_PER_MAP] = [0.0, 6.0, 10.0];
 const FINER_BLUR_PENALTY: f64 = -0.4;
-const COARSER_BLUR_PENALTIES: [f64; 3] = [0.0, 3.0, 7.0];
+const COARSER_BLUR_PENALTY: f64 = 3.0;
 
 /// Deadline of a frame, in periods after its capture.
 pub const DEADLINE_PERIODS: u64 = 2;
@@ -112,10 +112,8 @@ impl Planner {
         }
         // Sum of the penalties; sorted so that the cheapest plan comes first.
         let penalty = |plan: &Plan| {
-            let blur = match usual.checked_sub(plan.level) {
-                Some(below) => COARSER_BLUR_PENALTIES[below.min(COARSER_BLUR_PENALTIES.len() - 1)],
-                None => FINER_BLUR_PENALTY * (plan.level - usual) as f64,
-            };
+            let finer = plan.level as f64 - usual as f64;
+            let blur = if finer < 0.0 { -COARSER_BLUR_PENALTY * finer } else { FINER_BLUR_PENALTY * finer };
             EFFORT_PENALTY * (efforts.len() - 1 - plan.effort) as f64 + SHARING_PENALTIES[plan.frames - 1] + blur
         };
         plans.sort_by(|a, b| penalty(b).total_cmp(&penalty(a)));

@@ -271,7 +271,7 @@ mod tests {
         };
         let text = |value: &str| value.to_string();
         let values = parse(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
-        assert_eq!(values, [("focus", text("auto")), ("blur", text("3%")), ("quality", text("fast"))]);
+        assert_eq!(values, [("focus", text("auto")), ("blur", text("3%")), ("quality", text("draft"))]);
         for (bad, said) in [
             (&["rim"][..], "write NAME=VALUE"),
             (&["=3"], "write NAME=VALUE"),

@@ -47,7 +47,7 @@ pub struct Setting {
     pub group: Group,
     /// The help text.
     pub help: &'static str,
-    /// Its values by name and what each does; empty if they are not enumerated.
+    /// Its values; empty if they are not enumerated.
     pub choices: fn() -> Vec<Choice>,
     /// The range of its numbers, ends included; `None` if it accepts other values.
     pub range: fn() -> Option<RangeInclusive<f32>>,
@@ -88,16 +88,26 @@ macro_rules! settings {
     };
 }
 
-/// A value's name, and what it does.
-pub type Choice = (&'static str, &'static str);
+/// A value of a setting.
+#[derive(Clone, Copy, Debug)]
+pub struct Choice {
+    /// Its name.
+    pub name: &'static str,
+    /// What it does.
+    pub help: &'static str,
+    /// Names of earlier versions that mean this value now.
+    pub former_names: &'static [&'static str],
+}
 
-/// Returns names and help of all values of an enumeration.
+/// Returns all values of an enumeration.
 fn list_choices<T: Named>() -> Vec<Choice> {
-    T::VALUES.iter().map(|value| (value.name(), value.help())).collect()
+    let choice = |value: &T| Choice { name: value.name(), help: value.help(), former_names: value.former_names() };
+    T::VALUES.iter().map(choice).collect()
 }
 
 fn list_choices_with_auto<T: Named>() -> Vec<Choice> {
-    [vec![("auto", "The best for the available time")], list_choices::<T>()].concat()
+    let auto = Choice { name: "auto", help: "The best for the available time", former_names: &[] };
+    [vec![auto], list_choices::<T>()].concat()
 }
 
 settings! {

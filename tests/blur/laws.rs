@@ -32,7 +32,7 @@ fn a_constant_picture_stays_constant() {
                 (Quality::Draft, None, 0.0),
                 (Quality::Balanced, None, 8.0),
                 (Quality::Best, Some(Rank::Terms(7)), 0.0),
-                (Quality::Fast, Some(Rank::Terms(1)), 8.0),
+                (Quality::Balanced, Some(Rank::Terms(1)), 8.0),
                 (Quality::Draft, Some(Rank::Full), 0.0),
             ] {
                 let aperture = Aperture { shape: shape.clone(), intensity: 0.0 };

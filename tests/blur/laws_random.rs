@@ -204,8 +204,8 @@ fn nothing_shines_through_a_slope(make: Make) {
             // colours, which include the wall's.
             aperture: Aperture { shape: random.blades(), intensity: 2.0 * random.share() - 1.0 },
             rank: None,
-            // Lower levels have two bins behind the focal plane, where a slope would share one with the wall.
-            quality: random.of(if slope.is_in_front { &Quality::ALL } else { &Quality::ALL[2..] }),
+            // `draft` has two bins behind the focal plane, where a slope would share one with the wall.
+            quality: random.of(if slope.is_in_front { &Quality::ALL } else { &Quality::ALL[1..] }),
             far_max_px: max_px,
             near_max_px: max_px,
             ..random.settings(CocKind::Depth)

@@ -64,6 +64,7 @@ pub fn start(global: &Global) {
         LogFormat::Text => all.with(log.event_format(PlainFormat(full)).with_filter(filter)).try_init(),
         LogFormat::Json => all.with(log.json().with_filter(filter)).try_init(),
     };
+    bokehcam::names::repeat_warnings();
 }
 
 /// Prints a message of one or more lines.

@@ -9,7 +9,7 @@ fn values_make_the_look_that_the_command_line_makes_of_them() {
     let mut values = Values::default();
     assert_eq!(values.look(&Look::default()), Ok(Look::default()));
     let given =
-        [("focus", "0.5,0.4"), ("aperture", "polygon:6"), ("rim", "0.1"), ("quality", "high"), ("max-coc", "9")];
+        [("focus", "0.5,0.4"), ("aperture", "polygon:6"), ("rim", "0.1"), ("quality", "best"), ("max-coc", "9")];
     for (name, text) in given {
         values.set_text(place(name), Some(text.to_owned())).unwrap();
     }

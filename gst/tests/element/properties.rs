@@ -25,8 +25,10 @@ fn every_setting_is_a_property_with_its_default_and_its_choices() {
         let shown = match gst::glib::EnumValue::from_value(&value) {
             Some((class, choice)) => {
                 let names: Vec<&str> = class.values().iter().map(|value| value.nick()).collect();
-                let choices: Vec<&str> = (setting.choices)().iter().map(|choice| choice.0).collect();
-                assert_eq!(names, choices);
+                let choices = (setting.choices)();
+                let present = choices.iter().map(|choice| choice.name);
+                let former = choices.iter().flat_map(|choice| choice.former_names.iter().copied());
+                assert_eq!(names, present.chain(former).collect::<Vec<_>>());
                 choice.nick().to_owned()
             }
             None => match value.get::<f32>() {
@@ -40,6 +42,17 @@ fn every_setting_is_a_property_with_its_default_and_its_choices() {
         let computed = if (setting.range)().is_some() { "0" } else { "auto" };
         assert_eq!(shown, setting.default().unwrap_or_else(|| computed.to_owned()), "{name}");
         assert!(spec.blurb().is_some_and(|blurb| !blurb.contains("--")), "{name}");
+    }
+}
+
+#[test]
+fn a_former_name_sets_the_value_that_it_means_now() {
+    let element = element();
+    for (former, name) in [("fast", "draft"), ("high", "balanced")] {
+        element.set_property_from_str("quality", former);
+        let value = element.property_value("quality");
+        let (_, choice) = gst::glib::EnumValue::from_value(&value).unwrap();
+        assert_eq!(choice.nick(), name);
     }
 }
 

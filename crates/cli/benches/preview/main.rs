@@ -43,7 +43,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 Examples:
   cargo bench --bench preview
   cargo bench --bench preview -- --rounds 9 somewhere/rgbd
-  cargo bench --bench preview -- --panel --quality fast"
+  cargo bench --bench preview -- --panel --quality draft"
 )]
 struct Options {
     /// A folder with a recording that has depth [default: the synthetic scene, recorded anew at --size]
@@ -61,7 +61,7 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 5)]
     rounds: u32,
     /// Quality level of both: one that changes would compare unlike work
-    #[arg(long, value_name = "LEVEL", default_value = "fast")]
+    #[arg(long, value_name = "LEVEL", default_value = "draft")]
     quality: String,
     /// With the controls shown
     #[arg(long)]

@@ -46,7 +46,7 @@ const HEADING: &str = "size        coc px  quality    p50 ms   p95 ms   max ms  
 #[command(after_help = "\
 Examples:
   bokehcam bench
-  bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
+  bokehcam bench --sizes 1280x720 --quality draft,balanced,best --threads 1,2,4
   bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl")]
 pub struct BenchCommand {
     /// Picture sizes

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
-use bokehcam::look::settings::{Group, Setting};
+use bokehcam::look::settings::{Choice, Group, Setting};
 use bokehcam::look::{Patch, SETTINGS};
 use bokehcam::names::Named;
 
@@ -73,14 +73,15 @@ fn create_option(setting: &'static Setting) -> Arg {
     match choices.is_empty() {
         true => arg
             .value_parser(move |text: &str| setting.parse_into(&mut Patch::default(), text).map(|()| text.to_string())),
-        false => arg.value_parser(PossibleValuesParser::new(
-            choices.into_iter().map(|(name, help)| PossibleValue::new(name).help(help)),
-        )),
+        false => {
+            let value = |choice: Choice| PossibleValue::new(choice.name).help(choice.help).aliases(choice.former_names);
+            arg.value_parser(PossibleValuesParser::new(choices.into_iter().map(value)))
+        }
     }
 }
 
 /// Returns a parser for the names of `T`'s values.
 pub fn named_value_parser<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
-    let values = T::VALUES.iter().map(|value| PossibleValue::new(value.name()).help(value.help()));
-    PossibleValuesParser::new(values).try_map(|name| bokehcam::names::parse_name::<T>(&name))
+    let possible = |value: &T| PossibleValue::new(value.name()).help(value.help()).aliases(value.former_names());
+    PossibleValuesParser::new(T::VALUES.iter().map(possible)).try_map(|name| bokehcam::names::parse_name::<T>(&name))
 }

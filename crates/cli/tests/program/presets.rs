@@ -150,7 +150,8 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
     };
     let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::with_effect(Effect::TiltShift) };
     let shots = home.path("shots");
-    for (name, look, quality) in [("a", &dof, Quality::Fast), ("a", &dof, Quality::High), ("b.c", &tilt, Quality::Best)]
+    for (name, look, quality) in
+        [("a", &dof, Quality::Draft), ("a", &dof, Quality::Balanced), ("b.c", &tilt, Quality::Best)]
     {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
         let settings = Patch::from_look(&look.for_frame(&field, Some(quality))).values();

@@ -109,7 +109,7 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     let frame = frame.to_str().unwrap();
     run(&["record", PORTRAIT, "--frames", "1", "--to", frame]).done();
     let screen = Screen::new();
-    let still = [frame, "--quality", "fast", "--panel=false"];
+    let still = [frame, "--quality", "draft", "--panel=false"];
     let mut program = Program::start(&screen, &still);
     let window = program.window();
     window.until("the first picture", is_photograph);

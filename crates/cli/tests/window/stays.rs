@@ -15,7 +15,7 @@ use super::window::PATIENCE;
 #[ignore = "needs an X server"]
 fn a_frozen_picture_follows_the_look() {
     let screen = Screen::new();
-    let mut program = Program::start(&screen, &[PORTRAIT, "--panel=false", "--quality", "fast"]);
+    let mut program = Program::start(&screen, &[PORTRAIT, "--panel=false", "--quality", "draft"]);
     let window = program.window();
     window.until("the first picture", is_photograph);
     window.key(&[], u32::from('z'));

@@ -51,7 +51,7 @@ fn check(settings: Settings, what: &str) {
     let mut cpu = CpuBokeh::new(plan(&all), Some(2));
     let mut numbers = Numbers(11);
     for step in 0..60 {
-        let quality = Quality::ALL[(numbers.next() * 5.0) as usize];
+        let quality = Quality::ALL[(numbers.next() * Quality::ALL.len() as f32) as usize];
         let map = (numbers.next() * maps.len() as f32) as usize;
         cpu.set_quality(quality);
         let out = blurred(&mut cpu, &image, &maps[map], &all);

@@ -145,7 +145,7 @@ fn create_blur(settings: &bokeh::Settings) -> Result<Box<dyn Bokeh>, BokehError>
 }
 
 fn look(focus: FocusRule) -> Look {
-    let (strength, quality) = (Strength::AtInfinity(8.0), Some(Quality::Fast));
+    let (strength, quality) = (Strength::AtInfinity(8.0), Some(Quality::Draft));
     Look { focus, strength, quality, ..Look::with_effect(Effect::Dof) }
 }
 

@@ -36,7 +36,7 @@ pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
         focus,
         strength: Strength::AtInfinity(8.0),
         max_coc_px: Some(max_coc_px),
-        quality: Some(Quality::Fast),
+        quality: Some(Quality::Draft),
         ..Look::with_effect(Effect::Dof)
     }
 }
@@ -47,7 +47,7 @@ pub fn dof() -> Look {
 
 /// Returns a blur of one radius everywhere.
 pub fn uniform(radius_px: f32) -> Look {
-    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::with_effect(Effect::Blur) }
+    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Draft), ..Look::with_effect(Effect::Blur) }
 }
 
 impl Setup {

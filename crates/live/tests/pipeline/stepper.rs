@@ -65,5 +65,5 @@ fn quality_follows_the_time_only_once_that_is_said_and_where_it_may() {
     let look = Look::with_effect(Effect::Blur);
     assert_eq!(last(&look, None), "balanced");
     assert_eq!(last(&look, Some(1)), "draft");
-    assert_eq!(last(&Look { quality: Some(bokehcam::budget::Quality::High), ..look }, Some(1)), "high");
+    assert_eq!(last(&Look { quality: Some(bokehcam::budget::Quality::Best), ..look }, Some(1)), "best");
 }

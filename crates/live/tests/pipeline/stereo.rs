@@ -164,7 +164,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
         rim: 0.2,
         rank: None,
         highlights: 0.0,
-        quality: Quality::High,
+        quality: Quality::Balanced,
         adaptive: false,
         reuse: false,
         privacy: false,

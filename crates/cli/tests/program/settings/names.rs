@@ -1,4 +1,4 @@
-//! The blur strength has two names, which are equivalent in all settings.
+//! Former names go on working: the blur strength has two names, equivalent in all settings, and quality levels warn.
 
 use crate::program::{Home, Ran};
 
@@ -35,4 +35,23 @@ fn both_names_are_read_everywhere_and_one_is_written() {
     let both = Home::new().with_settings("blur = 1\ncoc-at-infinity = 2\n");
     both.run(&["config", "dump"]).refused(2, &["config.toml:2: ", "given twice, also by its other name"]);
     Home::new().run(&["config", "dump", "--blur", "1", "--coc-at-infinity", "2"]).refused(2, &["multiple times"]);
+}
+
+#[test]
+fn a_former_level_means_a_present_one_wherever_it_is_written_and_that_is_said_once() {
+    for (former, name) in [("fast", "draft"), ("high", "balanced")] {
+        let told = format!("warning: quality {former} is called {name} now\n");
+        let settings =
+            format!("quality = \"{former}\"\nrim = 0.1\n[presets.mine]\nquality = \"{former}\"\nrim = 0.2\n");
+        let home = Home::new().with_settings(&settings);
+        for args in [&["config", "dump"][..], &["config", "dump", "--preset", "mine"]] {
+            assert_eq!(home.run(args).done(), told, "{args:?}");
+        }
+        let home = Home::new();
+        assert_eq!(home.run(&["config", "dump", "--quality", former]).done(), told);
+        assert_eq!(Ran::of(home.command(&["config", "dump"]).env("BOKEHCAM_QUALITY", former)).done(), told);
+        let bench = ["bench", "--sizes", "32x24", "--frames", "1", "--backend", "cpu", "--quality", former];
+        let bench = home.run(&bench);
+        assert!(bench.done().contains(&told) && bench.stdout.contains(name), "{} {}", bench.stdout, bench.stderr);
+    }
 }

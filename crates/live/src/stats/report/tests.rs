@@ -12,7 +12,7 @@ fn report() -> Report {
         timings.sink.latency.add(30_000_000 + frame);
         counter.count_delivered(ticket);
     }
-    for level in ["fast", "balanced", "balanced", "balanced"] {
+    for level in ["draft", "balanced", "balanced", "balanced"] {
         timings.blur.quality_counts.add(level);
     }
     counter.count_lost(3, DropCause::Late);
@@ -45,7 +45,7 @@ fn the_summary_names_what_was_lost() {
     let text = report().to_string();
     assert!(text.starts_with("10 of 13 frames delivered in 0.50 s (20.0 per second), 3 late\n"), "{text}");
     assert!(!text.contains("blur.rows"));
-    assert!(text.ends_with("\nquality: fast 25 %, balanced 75 %; 1 changes"), "{text}");
+    assert!(text.ends_with("\nquality: draft 25 %, balanced 75 %; 1 changes"), "{text}");
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn a_machine_that_is_too_slow_is_named_with_what_to_do() {
         report.outcome()
     };
     assert_eq!(
-        outcome(report(), (1280, 720), "fast"),
+        outcome(report(), (1280, 720), "balanced"),
         "10 of 13 frames delivered in 0.50 s\n23 of 30 frames a second were shown: this machine is too slow for \
          1280x720; try --size 640x480 or --quality draft"
     );
@@ -65,7 +65,7 @@ fn a_machine_that_is_too_slow_is_named_with_what_to_do() {
     assert_eq!(report().outcome(), "10 of 13 frames delivered in 0.50 s");
     let mut few = report();
     (few.frames.captured, few.frames.delivered) = (303, 300);
-    assert_eq!(outcome(few, (1280, 720), "fast").lines().count(), 1);
+    assert_eq!(outcome(few, (1280, 720), "balanced").lines().count(), 1);
     let mut faulty = report();
     (faulty.frames.dropped.corrupt, faulty.frames.dropped.late) = (2, 1);
     assert_eq!(faulty.outcome(), "10 of 13 frames delivered in 0.50 s, 2 damaged");

@@ -165,7 +165,7 @@ fn all_that_is_drawn_is_translated() {
     texts::set_translation(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
     let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();
     let controls = ["Brightness", "White balance", "Auto exposure", "Exposure time"];
-    let levels = ["draft", "fast", "balanced", "high", "best", "auto", "full"];
+    let levels = ["draft", "balanced", "best", "auto", "full"];
     let units = ["fps", "px", "mm", "kB", "MB"];
     for mut window in windows() {
         window.wait(0.3);
