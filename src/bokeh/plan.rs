@@ -314,7 +314,7 @@ impl Plan {
     /// depth of the picture's size.
     pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
         let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
-        let some = 1..=Matte::max_pixels(self.width, self.picture_rows());
+        let some = 1..=Matte::capacity(self.width, self.picture_rows());
         let apart = self.compositing == Compositing::Layers && matches!(coc, CocField::Depth(_));
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }
