@@ -11,8 +11,8 @@
 //! The result is told to the blur as mixed pixels, as the background memory does, which knows better where it has seen
 //! something: pixels that are in the matte stay as they are.
 //!
-//! Measured on rendered scenes (thin lens, 640 x 360): half of what exact knowledge would gain. Outlines that are wrong by
-//! pixels, as in maps of networks, were not measured.
+//! Measured on rendered scenes (thin lens, 640x360): about half of what exact knowledge would gain. Outlines that are wrong
+//! by pixels, as in maps of networks, were not measured.
 
 mod junctions;
 mod labels;
