@@ -139,7 +139,7 @@ impl<'a> FilledCells<'a> {
         let here = y / CELL * grid.across + x / CELL;
         let beside = |at: usize, (first, end): (usize, usize)| {
             let cell = at / CELL;
-            let other = if at % CELL == 0 { cell.wrapping_sub(1) } else { cell + 1 };
+            let other = if at.is_multiple_of(CELL) { cell.wrapping_sub(1) } else { cell + 1 };
             if (first..end).contains(&other) { other } else { cell }
         };
         let (x, y) = ([x / CELL, beside(x, grid.columns)], [y / CELL, beside(y, grid.rows)]);
