@@ -14,13 +14,6 @@ override MARGIN_PX: f32;            // added to silhouette distances, because th
 override CROSS_FADE: f32;           // half the width of a cross-fade of bins, relative to the border's CoC
 override FADE_FRACTION: f32;        // fraction of a silhouette's squared radius over which it fades out
 override MIN_OWN_COVERAGE: f32;     // a surface with less coverage does not fill a pixel
-override STEPS_ACROSS: u32;         // directions of inpainting, four bits each, offset by 8
-override STEPS_DOWN: u32;
-override MAX_STEPS: u32;            // longest search along a direction
-override HALF_SIMILAR_PX: f32;      // CoC difference of similarity 0.5
-override ONE_SURFACE_PX: f32;       // smaller CoC ranges are one surface
-override TRUSTED_STEPS: f32;        // lines up to this length are fully trusted
-override ONE_ENDED_FACTOR: f32;     // length factor of a line with one end
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes are linear within each octave
 override OCTAVE_SHIFT: u32;         // right shift of a float that leaves its node in the octave
 override SPLINE_LEFT: f32;          // see src/bokeh/bank/reduced.rs

@@ -97,9 +97,6 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             let pixel = min(patch_corner(tile, number) + vec2(thread % PATCH, thread / PATCH), level.size - 1u);
             let at = pixel_index(level, pixel);
             var own = Known(pyramid[at], known[at]);
-            if number == 1u && own.known == 0.0 {
-                own = Known(pyramid[directional_offset() + at], known[directional_offset() + at]);
-            }
             if number < coarsest {
                 own = complete_pixel(number, own, pixel, tile);
             }

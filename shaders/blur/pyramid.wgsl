@@ -42,15 +42,6 @@ fn pixel_index(level: Level, pixel: vec2<u32>) -> u32 {
     return level.at + pixel.y * level.size.x + pixel.x;
 }
 
-// Offset of the result of `directional` for level 1: behind all levels.
-fn directional_offset() -> u32 {
-    var level = pyramid_level(1u);
-    while !is_coarsest(level.size) {
-        level = coarser_level(level);
-    }
-    return level.at + 1u;
-}
-
 fn plus(a: Known, b: Known) -> Known {
     return Known(a.value + b.value, a.known + b.known);
 }

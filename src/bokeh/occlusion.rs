@@ -49,31 +49,6 @@ pub fn excess_step_px(near_px: f32, far_px: f32, min_step_px: f32) -> f32 {
     far_px - near_px - if surface_step_px > min_step_px { surface_step_px } else { min_step_px }
 }
 
-/// Directions of directional inpainting, as steps across and down; each line is searched both ways. If both ends of a
-/// line through a hidden pixel have similar CoC, they predict the pixel between them. Straight outlines therefore
-/// continue behind an occluder, where an average of the surroundings would end them. After the continuation of
-/// isophotes in Bertalmio et al., *Image Inpainting*, SIGGRAPH 2000, section 3, with surfaces distinguished by their
-/// CoC.
-pub const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (2, 1), (1, 1), (1, 2), (0, 1), (-1, 2), (-1, 1), (-2, 1)];
-/// Longest search along a line, in steps.
-pub const MAX_STEPS: u8 = 254;
-/// CoC difference at which [`coc_similarity`] is 0.5.
-pub const HALF_SIMILAR_PX: f32 = 2.0;
-/// CoC range below which all ends seen from a pixel belong to one surface; pull-push averaging is then as good.
-pub const ONE_SURFACE_PX: f32 = 1.0;
-/// Line length, in steps from end to end, up to which a line is fully trusted; the trust is 0 from twice this length
-/// on. Deep inside a large hole lines from far away intersect, and pull-push averaging has no such edges.
-pub const TRUSTED_STEPS: f32 = 12.0;
-/// A line with one end counts like one with two similar ends that is this many times as long.
-pub const ONE_ENDED_FACTOR: f32 = 4.0;
-
-/// Returns the similarity of two surfaces by CoC, `1 / (1 + d^2)`: 1 if equal, towards 0 far apart.
-#[inline(always)]
-pub fn coc_similarity(a_px: f32, b_px: f32) -> f32 {
-    let apart = (a_px - b_px) * (1.0 / HALF_SIMILAR_PX);
-    1.0 / (1.0 + apart * apart)
-}
-
 /// Returns the distances from the silhouette between two pixels with these CoC, in pixels, -1 if nowhere: up to where
 /// anything farther is visible through the aperture, which is the radius of the nearer surface; the same if the farther
 /// surface is not in front of the subject; up to where the hidden background matters, as it is itself blurred. There is

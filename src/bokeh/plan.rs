@@ -43,8 +43,9 @@ pub const MAX_BINS: usize = 11;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const MIN_COVERAGE: f32 = 1e-3;
 
-/// A bin with at least this weight of a nearer surface shows nothing of the surface it occludes.
-pub const HIDING_WEIGHT: f32 = 0.25;
+/// A bin with at least this weight of a nearer surface shows nothing of the surface it occludes. What it shows at a smaller
+/// weight is also where the nearer surface's own share of the bin is missed, up to a quarter of this.
+pub const HIDING_WEIGHT: f32 = 0.02;
 
 /// Coverage from which a bin counts fully when the colour of the hindmost bin is computed.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
@@ -314,7 +315,7 @@ impl Plan {
     /// depth of the picture's size.
     pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
         let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
-        let some = 1..=Matte::max_pixels(self.width, self.picture_rows());
+        let some = 1..=Matte::capacity(self.width, self.picture_rows());
         let apart = self.compositing == Compositing::Layers && matches!(coc, CocField::Depth(_));
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }

@@ -27,7 +27,7 @@ impl Bands {
     }
 
     /// Returns the rows of each band.
-    pub fn rows(self) -> impl Iterator<Item = Range<usize>> {
+    pub fn rows(self) -> impl Iterator<Item = Range<usize>> + Clone {
         (0..self.height).step_by(self.rows).map(move |first| first..(first + self.rows).min(self.height))
     }
 

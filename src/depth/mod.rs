@@ -14,6 +14,7 @@ pub mod fill;
 pub mod focus;
 pub mod follow;
 mod guided_fill;
+pub mod hidden;
 pub mod matting;
 pub mod misalignment;
 pub mod motion;

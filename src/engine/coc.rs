@@ -7,6 +7,7 @@ use crate::compute::{Device, DeviceFrame};
 use crate::depth::background::BackgroundMemory;
 use crate::depth::fill::HoleFiller;
 use crate::depth::focus::{Focus, FocusRule};
+use crate::depth::hidden::HiddenSurfaces;
 use crate::depth::matting::{self, Matting};
 use crate::depth::refine::{MapCorrection, Refiner};
 use crate::frame::{ColorImage, DepthMap};
@@ -46,6 +47,7 @@ pub struct CocCalculator {
     /// Whether a matte was estimated since the device was set: the device is only tried once a matte is needed.
     has_estimated_matte: bool,
     background: Option<BackgroundMemory>,
+    hidden: HiddenSurfaces,
     workers: ThreadPool,
 }
 
@@ -102,6 +104,7 @@ impl CocCalculator {
             matting,
             has_estimated_matte: false,
             background: None,
+            hidden: HiddenSurfaces::default(),
             workers: ThreadPool::new("depth", 1),
         }
     }
@@ -291,8 +294,8 @@ impl CocCalculator {
         }
     }
 
-    /// Fills the hidden background of a map from memory. If `taken_ns` is given, the memory first learns from this
-    /// frame.
+    /// Adds what the surfaces of a map hide to its matte: from memory, and behind near things by an estimate where there is
+    /// none. If `taken_ns` is given, the memory first learns from this frame.
     fn fill_hidden_background(
         &mut self,
         map: &mut DepthMap,
@@ -300,13 +303,15 @@ impl CocCalculator {
         field: &CocField,
         taken_ns: Option<u64>,
     ) {
-        let Self { background, workers, .. } = self;
-        if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
+        let Self { background, hidden, workers, .. } = self;
+        let (CocField::Depth(lens), false) = (field, map.is_smooth) else { return };
+        if let Some(background) = background {
             if let Some(taken_ns) = taken_ns {
                 background.update(workers, (map, color), lens, taken_ns);
             }
             background.reveal_background(workers, map, color, lens);
         }
+        hidden.add_to_matte(workers, map, color, lens);
     }
 }
 

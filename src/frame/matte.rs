@@ -54,10 +54,19 @@ pub struct Matte {
 }
 
 impl Matte {
-    /// Returns the largest valid number of mixed pixels: with more, the depth is noise, and the picture is blurred
-    /// without the matte.
+    /// Returns the largest valid number of pixels on outlines, with an alpha below 1: with more, the depth is noise.
     pub fn max_pixels(width: usize, height: usize) -> usize {
         width * height / 4
+    }
+
+    /// Returns the largest valid number of other pixels, which hide a known surface entirely.
+    pub fn max_hidden(width: usize, height: usize) -> usize {
+        width * height / 4
+    }
+
+    /// Returns the largest valid number of all pixels; with more, the picture is blurred without the matte.
+    pub fn capacity(width: usize, height: usize) -> usize {
+        Self::max_pixels(width, height) + Self::max_hidden(width, height)
     }
 
     /// Returns the mixed pixels among the pixels `range`.

@@ -123,3 +123,39 @@ fn a_near_thing_before_the_subject_shows_the_subject_and_not_the_wall_behind_it(
         }
     }
 }
+
+/// A blurred thing whose weight is shared between the bin of its radius and that of the wall: what it is known to hide
+/// shows at its rim, and nowhere else.
+#[test]
+fn a_wall_known_behind_a_blurred_thing_shows_no_farther_than_the_rim() {
+    let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 12.0 };
+    let metres = |radius_px: f32| 1.0 / (1.0 - radius_px / 12.0);
+    let (wall_px, edge) = (9.5, 160);
+    let settings = Settings { far_max_px: 12.0, near_max_px: 12.0, ..settings(CocKind::Depth) };
+    let image = color(SIZE.0, SIZE.1, |x, _| if x < edge { [230; 3] } else { [10; 3] });
+    let [thing, wall] = [230.0, 10.0].map(|code: f32| srgb_to_linear(code / 255.0));
+    for radius_px in (0..12).map(|step| 6.4 + 0.2 * step as f32) {
+        let mut map = depth(SIZE.0, SIZE.1, |x, _| metres(if x < edge { radius_px } else { wall_px }));
+        let hiding = (0..SIZE.1).flat_map(|y| (edge - 12..edge).map(move |x| y * SIZE.0 + x));
+        map.matte.pixels = hiding
+            .map(|at| MixedPixel {
+                at,
+                near_m: metres(radius_px),
+                far_m: metres(wall_px),
+                alpha: 1.0,
+                background_alpha: 1.0,
+                difference: [thing - wall; 3],
+            })
+            .collect();
+        let mut out = ColorImage::default();
+        CpuBokeh::new(Plan::new(&settings, SIZE.0, SIZE.1), Some(1))
+            .blur(&image, Some(&map), &CocField::Depth(lens), &mut out)
+            .expect("a blur of fitting input");
+        let row = &out.rgb[(100 * SIZE.0 * 3) as usize..];
+        // The aperture ends at its radius, and its rim is soft.
+        for x in 100..edge - (1.2 * radius_px) as u32 - 3 {
+            let code = row[3 * x as usize];
+            assert!(code.abs_diff(230) <= 1, "{radius_px} px: {code} at {} px inside", edge - x);
+        }
+    }
+}

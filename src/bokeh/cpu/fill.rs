@@ -2,9 +2,8 @@
 //! bins behind them are made.
 //!
 //! Pull-push (Gortler et al., *The Lumigraph*, SIGGRAPH 1996): averages of known pixels over ever larger areas flow
-//! back into the holes. Directional inpainting takes precedence where lines through a hole show which surface continues
-//! behind it. Each layer is inpainted separately, from pixels that are not in front of it: behind a head are the trees,
-//! and behind both the sky.
+//! back into the holes. Each layer is inpainted separately, from pixels that are not in front of it: behind a head are the
+//! trees, and behind both the sky. Where the matte knows what is hidden, that takes precedence.
 //!
 //! twin: shaders/blur/find_occluders.wgsl, pull.wgsl, coarse.wgsl, fill.wgsl
 
@@ -15,7 +14,6 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, Simd};
 
-use super::directional::DirectionalInpainting;
 use super::levels::{Base, Level, PLANES, Pull, Push};
 use super::rows::{COPY_WIDTH, PlanarRows};
 use super::silhouettes::Silhouettes;
@@ -35,8 +33,6 @@ pub struct Pyramid {
     /// The picture at half size.
     halves: PlanarRows<PLANES>,
     levels: Vec<Level>,
-    /// Directional inpainting of the level above the finest.
-    directional: DirectionalInpainting,
     /// Flags of the work items of the largest pass.
     taken: Vec<AtomicBool>,
 }
@@ -81,9 +77,7 @@ impl Pyramid {
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
         let taken = (0..height).map(|_| AtomicBool::new(false)).collect();
-        let outlined = &levels[1.min(levels.len() - 1)];
-        let directional = DirectionalInpainting::new(outlined.width, outlined.height);
-        Self { halves: PlanarRows::new(levels[0].width, levels[0].height, 0), levels, directional, taken }
+        Self { halves: PlanarRows::new(levels[0].width, levels[0].height, 0), levels, taken }
     }
 
     /// Returns the picture at half size, to be written in bands of `rows` rows of the picture.
@@ -94,13 +88,7 @@ impl Pyramid {
     }
 
     /// Inpaints the pixels whose `visible_weight` is below 1, after the picture at half size is written.
-    pub fn fill(
-        &mut self,
-        visible_weight: &BinWeight,
-        silhouettes: &Silhouettes,
-        workers: &mut ThreadPool,
-        arch: Arch,
-    ) {
+    pub fn fill(&mut self, visible_weight: &BinWeight, workers: &mut ThreadPool, arch: Arch) {
         self.compute_base(visible_weight, workers, arch);
         for k in 1..self.levels.len() {
             let (finer, coarser) = self.levels.split_at_mut(k);
@@ -110,9 +98,6 @@ impl Pyramid {
             workers.run(coarse.height.div_ceil(ROWS_PER_ITEM), &|part| {
                 arch.dispatch(Pull { fine, first: part * ROWS_PER_ITEM, rows: rows.part(part), stride, width });
             });
-        }
-        if let Some(level) = self.levels.get_mut(1) {
-            self.directional.fill(level, silhouettes, workers, arch);
         }
         for k in (1..self.levels.len()).rev() {
             let (finer, coarser) = self.levels.split_at_mut(k);

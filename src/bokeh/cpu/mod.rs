@@ -9,7 +9,6 @@ mod blur;
 mod cell_sums;
 mod composite;
 mod decimate;
-mod directional;
 mod encode;
 mod enlarge;
 mod fill;
@@ -147,7 +146,7 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.visible_weight(layer.start), &self.silhouettes, &mut self.workers, self.arch);
+                pyramid.fill(&self.plan.visible_weight(layer.start), &mut self.workers, self.arch);
             }
             lap("fill")?;
             self.compute_bins(&frame, Some(layer));

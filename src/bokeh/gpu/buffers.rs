@@ -48,7 +48,7 @@ pub struct Buffers {
     pub result: wgpu::Buffer,
     /// CoC of the nearest surface, at half size.
     pub nearest_px: wgpu::Buffer,
-    /// All levels of the pyramid, and the result of directional inpainting.
+    /// All levels of the pyramid.
     pub pyramid: wgpu::Buffer,
     /// Known weight of each pixel of the pyramid.
     pub known: wgpu::Buffer,
@@ -113,7 +113,7 @@ impl Buffers {
         let pyramid_pixels = if layered { count_pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let grid = if layered { width.div_ceil(SILHOUETTE_CELL) * height.div_ceil(SILHOUETTE_CELL) } else { 1 };
-        let mixed = if layered { Matte::max_pixels(width, height).max(1) } else { 1 };
+        let mixed = if layered { Matte::capacity(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { concatenate_kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
         Self {
@@ -165,13 +165,12 @@ fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     taps.chunks(terms).flat_map(|tap| tap.chunks(4).map(padded)).collect()
 }
 
-/// Returns the number of stored pixels of the pyramid: all levels from a quarter of the picture's size to one pixel,
-/// and the result of directional inpainting for the first of them.
+/// Returns the number of stored pixels of the pyramid: all levels from a quarter of the picture's size to one pixel.
 fn count_pyramid_pixels(width: usize, height: usize) -> usize {
     let halved = |size: &[usize; 2]| size.map(|side| side.div_ceil(2));
     let finest = [width, height].map(|side| side.div_ceil(4));
     let levels = std::iter::successors(Some(finest), |level| (*level != [1, 1]).then(|| halved(level)));
-    levels.chain([finest]).map(|[across, down]| across * down).sum()
+    levels.map(|[across, down]| across * down).sum()
 }
 
 /// Returns the kernels of all nodes, one after the other, and the start of each.

@@ -1,5 +1,5 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
-//! [`super::plan`]. A pass of several dispatches (`fill`: find_occluders, pull, coarse, directional, fill) has a file
+//! [`super::plan`]. A pass of several dispatches (`fill`: find_occluders, pull, coarse, fill) has a file
 //! for each.
 
 mod buffers;

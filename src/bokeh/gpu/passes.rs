@@ -21,9 +21,9 @@ const SILHOUETTES: &str = shaders::UNPACK.name;
 
 /// The passes of a layer.
 struct Layer {
-    /// Inpainting of the background behind the layers in front: pull-push, directional, and the filled scene. `None`
+    /// Inpainting of the background behind the layers in front: pull-push, and the filled scene. `None`
     /// for the foremost layer, which uses the scene unchanged.
-    fill: Option<[Pass; 4]>,
+    fill: Option<[Pass; 3]>,
     bin: Pass,
 }
 
@@ -78,10 +78,9 @@ impl PassBuilder<'_> {
     fn create_layer(&self, index: usize, picture: [u32; 2]) -> Layer {
         let b = self.buffers;
         let fill = (index > 0).then(|| {
-            let [half, quarter] = [2, 4].map(|scale| picture.map(|side| side.div_ceil(scale)));
+            let half = picture.map(|side| side.div_ceil(2));
             let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known, &b.mixed];
             let coarse = [&b.frame, &b.pyramid, &b.known];
-            let lines = [&b.frame, &b.pyramid, &b.known, &b.dilated];
             let (seen, nearest, lists) = ([&b.scene, &b.ranges, &b.inpainted], &b.nearest_px, &b.binned);
             let filled = [
                 &b.frame, &b.pyramid, &b.known, seen[0], seen[1], seen[2], nearest, &b.bins, lists, &b.dilated,
@@ -92,8 +91,6 @@ impl PassBuilder<'_> {
                 // A thread does four pixels of half the size, or of the picture.
                 self.create_pass(shaders::PULL, &work, &pulled, covering_workgroups(half, 2 * TILE)).with_name(FILL),
                 self.create_pass(shaders::COARSE, &[], &coarse, [1; 3]).with_name(FILL),
-                self.create_pass(shaders::DIRECTIONAL, &[], &lines, covering_workgroups(quarter, SMALL_TILE))
-                    .with_name(FILL),
                 self.create_pass(shaders::FILL, &work, &filled, covering_workgroups(picture, TILE)),
             ]
         });

@@ -4,8 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{EXTRA_TAPS, OCTAVE_SHIFT, OCTAVES_FROM_PX, SPLINE_LEFT};
 use crate::bokeh::occlusion::{
-    DIRECTIONS, FADE_FRACTION, HALF_SIMILAR_PX, MARGIN_PX, MAX_STEPS, MIN_OWN_COVERAGE, ONE_ENDED_FACTOR,
-    ONE_SURFACE_PX, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL, TRUSTED_STEPS,
+    FADE_FRACTION, MARGIN_PX, MIN_OWN_COVERAGE, OTHER_SURFACE_FROM, OTHER_SURFACE_TO, SILHOUETTE_CELL,
 };
 use crate::bokeh::plan::{
     CELL, CELL_SHARPNESS, HIDING_WEIGHT, HINDMOST_COVERAGE, MIN_CELL_WEIGHT, MIN_COVERAGE, SEGMENT, UNBOUNDED_COLOR,
@@ -41,14 +40,12 @@ pub const FIND_OCCLUDERS: Shader = shader!(blur: "common"; "find_occluders", "mi
 pub const PULL: Shader = shader!(blur: "common"; "pull", "pyramid", "base", "mixed");
 /// Pull-push: the coarsest levels, and back.
 pub const COARSE: Shader = shader!(blur: "common"; "coarse", "pyramid");
-/// Directional inpainting.
-pub const DIRECTIONAL: Shader = shader!(blur: "common"; "directional", "pyramid");
 /// Push to the picture.
 pub const FILL: Shader =
     shader!(blur: "common"; "fill", "pyramid", "base", "mixed", "cells", "range", "list", "tiles", "next", "meet");
 pub const COMPOSITE: Shader = shader!(blur: "common"; "composite", "surfaces", "cells", "list", "yuyv");
 
-pub const ALL: [Shader; 17] = [
+pub const ALL: [Shader; 16] = [
     CLEAR,
     UNPACK,
     DILATE_ROWS,
@@ -63,7 +60,6 @@ pub const ALL: [Shader; 17] = [
     FIND_OCCLUDERS,
     PULL,
     COARSE,
-    DIRECTIONAL,
     FILL,
     COMPOSITE,
 ];
@@ -90,20 +86,8 @@ pub const LIST_HEAD: usize = 16;
 /// Scale of a bin from which four threads share the many taps of a pixel, two per axis.
 pub const SHARED_FROM_SCALE: u32 = 4;
 
-/// Packs the steps of [`DIRECTIONS`] across (0) or down (1), four bits each, offset by 8.
-const fn pack_steps(axis: usize) -> f64 {
-    let (mut packed, mut d) = (0u32, 0);
-    while d < DIRECTIONS.len() {
-        let (across, down) = DIRECTIONS[d];
-        let step = if axis == 0 { across } else { down };
-        packed |= ((step + 8) as u32) << (4 * d);
-        d += 1;
-    }
-    packed as f64
-}
-
 /// Values of the `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 34] = [
+pub const CONSTANTS: [(&str, f64); 27] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("UNBOUNDED_COLOR", UNBOUNDED_COLOR as f64),
@@ -118,13 +102,6 @@ pub const CONSTANTS: [(&str, f64); 34] = [
     ("CROSS_FADE", CROSS_FADE as f64),
     ("FADE_FRACTION", FADE_FRACTION as f64),
     ("MIN_OWN_COVERAGE", MIN_OWN_COVERAGE as f64),
-    ("STEPS_ACROSS", pack_steps(0)),
-    ("STEPS_DOWN", pack_steps(1)),
-    ("MAX_STEPS", MAX_STEPS as f64),
-    ("HALF_SIMILAR_PX", HALF_SIMILAR_PX as f64),
-    ("ONE_SURFACE_PX", ONE_SURFACE_PX as f64),
-    ("TRUSTED_STEPS", TRUSTED_STEPS as f64),
-    ("ONE_ENDED_FACTOR", ONE_ENDED_FACTOR as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
     ("SPLINE_LEFT", SPLINE_LEFT as f64),

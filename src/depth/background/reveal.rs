@@ -43,7 +43,7 @@ impl BackgroundMemory {
             std::mem::swap(&mut map.matte.pixels, first);
             others.iter().for_each(|(pixels, _)| map.matte.pixels.extend_from_slice(pixels));
         }
-        if map.matte.pixels.len() > Matte::max_pixels(size.0, size.1) {
+        if map.matte.pixels.len() > Matte::capacity(size.0, size.1) {
             map.matte.pixels.retain(|pixel| pixel.alpha < 1.0);
         }
         self.pixels = pixels;
