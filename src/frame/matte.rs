@@ -57,7 +57,13 @@ impl Matte {
     /// Returns the largest valid number of mixed pixels: with more, the depth is noise, and the picture is blurred
     /// without the matte.
     pub fn max_pixels(width: usize, height: usize) -> usize {
-        width * height / 4
+        width * height / 2
+    }
+
+    /// Returns the largest number of pixels beside depth discontinuities that are matted; the rest of
+    /// [`Self::max_pixels`] is for thin structures that continue from them.
+    pub fn max_edges(width: usize, height: usize) -> usize {
+        Self::max_pixels(width, height) / 4 * 3
     }
 
     /// Returns the mixed pixels among the pixels `range`.
