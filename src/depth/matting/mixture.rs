@@ -1,6 +1,6 @@
 //! Mixtures of two surfaces' colours: the likelihood of a pixel's light for each alpha, and the two colours that make up
 //! a mixed pixel.
-//! twin: shaders/matte/mixture.wgsl, matte/mix.wgsl
+//! twin: shaders/matte/compare.wgsl, matte/mix.wgsl
 
 #![allow(clippy::needless_range_loop)] // Planes and pixels index several arrays at once.
 

@@ -38,7 +38,6 @@ use super::bitmap::Bitmap;
 use alpha::{Evidence, LANES, Labels, Prior};
 use clusters::{Clusters, FrameView};
 use edges::EdgeDetector;
-
 use passes::{ComputeAlphas, EvaluateColors, SeparateColors};
 use rank::keep_rarest_steps;
 use trace::{Trace, WideRegions};
