@@ -3,7 +3,7 @@
 
 struct Frame {
     size: vec2<u32>,        // picture size, in pixels
-    max_entries: u32,       // maximum number of entries; with more edges there is no matte
+    max_entries: u32,       // maximum number of entries; three quarters of them may be edges
     min_rounds: u32,        // rounds from which on the background is known; 0: no background
     depth_step: f32,        // depth discontinuity: a larger step of inverse depth, in 1/m, separates two surfaces
     surface_step: f32,      // minimum step of inverse depth from a surface to the background behind it, in 1/m
@@ -28,10 +28,14 @@ override FRINGE_SAME: f32;
 override SHRINKAGE: f32;
 override QUANTISATION: f32;
 override MAX_DEVIATION: f32;
-override MAX_CERTAINTY: f32;
+override ISOTROPY: f32;
+override NOISE: f32;
+override ALPHA_VARIANCE: f32;
+override MIN_VARIANCE: f32;
+override UNCERTAINTY: f32;
+override UNCERTAIN_WEIGHT: f32;
 override OUTLIER: f32;
 override MIN_LIKELIHOOD: f32;
-override MIN_OFF_LINE: f32;
 override FIRST_MIXED: f32;      // initial value of the prior, and its bounds
 override FIRST_WRONG: f32;
 override PRIOR_MIN: f32;
@@ -48,15 +52,19 @@ const CELL = 8u;
 const WORD = 32u;
 const BLOCK = 256u;
 
-// Indices into `counts`: number of edges, 0 if there are too many; the next free entry; number of all edges found; per
-// step, the first being that of the edges, the number of claimed pixels, and of listed cells; the set bits before each
-// block of words.
+// Indices into `counts`: number of edges; the next free entry; per step, the first being that of the edges, the number
+// of claimed pixels, and of listed cells; the number of edges found of each size of step; the set bits before each block
+// of words.
 const EDGES = 0u;
 const NEXT = 1u;
-const FOUND_EDGES = 2u;
 const CLAIMED = 4u;
 const LISTED = 24u;
-const TOTALS = 64u;
+const STEP_SIZES = 64u;
+const TOTALS = 96u;
+
+// Number of sizes of step, and of bits of a float below those of its half octave.
+const SIZES = 32u;
+const BITS_BELOW_SIZE = 22u;
 
 // A word of `places`: if `ENTERED` is set, the other bits are the pixel's entry; before that, they are the directions
 // it was claimed from.

@@ -48,24 +48,11 @@ fn inverse_scatter(near: Color, far: Color) -> Symmetric {
     return invert(regularize(Symmetric(near.row + far.row, near.rest + far.rest), 1.0 - SHRINKAGE));
 }
 
-// Alpha is the dot product of a colour and `direction`, less `offset`; `certainty` is the reciprocal variance of that
-// within one surface.
-struct Discriminant {
-    direction: vec3<f32>,
-    offset: f32,
-    certainty: f32,
-}
-
-fn create_discriminant(near: vec3<f32>, spread: Symmetric, far: vec3<f32>) -> Discriminant {
-    let difference = near - far;
-    let product = multiply(spread, difference);
-    let contrast = max(dot(product, difference), 1e-9);
-    let direction = product / contrast;
-    return Discriminant(direction, dot(direction, far), min(2.0 * contrast, MAX_CERTAINTY));
-}
-
-fn discriminant_alpha(d: Discriminant, light: vec3<f32>) -> f32 {
-    return dot(d.direction, light) - d.offset;
+// Alpha of a colour, from below 0 to above 1, along the discriminant of both surfaces.
+fn discriminant_alpha(near: Color, far: Color, light: vec3<f32>) -> f32 {
+    let difference = near.mean - far.mean;
+    let product = multiply(inverse_scatter(near, far), difference);
+    return dot(product, light - far.mean) / max(dot(product, difference), 1e-9);
 }
 
 // Whether the light is plausible for the far surface, by its Mahalanobis distance.

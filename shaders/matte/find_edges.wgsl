@@ -38,6 +38,8 @@ fn matte_find_edges(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     let pixel = corner + local.xy;
     if all(pixel < frame.size) && near - far > frame.depth_step {
         atomicOr(&bits[local.y], 1u << local.x);
+        let own = inverse[(local.y + 1u) * WIDE_PX + local.x + 1u];
+        atomicAdd(&counts[STEP_SIZES + size_of_step(near, far, own)], 1u);
     }
     workgroupBarrier();
     if local.x == 0u && pixel.y < frame.size.y {

@@ -13,6 +13,12 @@ fn color_from_sums(s: Sums) -> Color {
     return Color(mean, s.b.xyz / s.a.x - mean.x * mean, vec3(s.b.w, s.c) / s.a.x - mean.yyz * mean.yzz);
 }
 
+// A colour that was found with this total weight: with little, it may be another one.
+fn with_uncertainty(color: Color, weight: f32) -> Color {
+    let variance = UNCERTAINTY * (UNCERTAIN_WEIGHT / (UNCERTAIN_WEIGHT + weight));
+    return Color(color.mean, color.row + vec3(variance, 0.0, 0.0), color.rest + vec3(variance, 0.0, variance));
+}
+
 fn add_cluster(s: Sums, weight: f32, k: u32) -> Sums {
     return Sums(s.a + weight * clusters[k], s.b + weight * clusters[k + 1u], s.c + weight * clusters[k + 2u].xy);
 }
@@ -24,7 +30,7 @@ fn blend_fringe(near: Color, far: Color, sums: Sums) -> Color {
         return near;
     }
     let fringe = color_from_sums(sums);
-    let alpha = discriminant_alpha(create_discriminant(near.mean, inverse_scatter(near, far), far.mean), fringe.mean);
+    let alpha = discriminant_alpha(near, far, fringe.mean);
     let other = counts * clamp((FRINGE_SAME - alpha) / (FRINGE_SAME - FRINGE_OTHER), 0.0, 1.0);
     if other <= 0.0 {
         return near;
@@ -70,7 +76,7 @@ fn find_colors(cell: vec2<u32>, near: f32, far: f32, model: u32) -> bool {
         }
         if of_near.a.x > 0.0 && of_far.a.x > 0.0 {
             let color = color_from_sums(of_far);
-            colors[2u * model] = blend_fringe(color_from_sums(of_near), color, of_fringe);
+            colors[2u * model] = blend_fringe(with_uncertainty(color_from_sums(of_near), of_near.a.x), color, of_fringe);
             colors[2u * model + 1u] = color;
             return true;
         }

@@ -1,5 +1,5 @@
 // Pass matte_total, one workgroup: number of set bits before each block, and in all. In the first run the bits are
-// edges; in the second, mixed pixels: their number, and that of the edges, is written before the list of mixed pixels.
+// edges; in the second, mixed pixels: their number, and that of the edges found, is written before the list of mixed pixels.
 
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> mixed: array<vec4<u32>>;     // two for the counts, and two a pixel
@@ -18,12 +18,14 @@ fn matte_total(@builtin(local_invocation_index) thread: u32) {
     if thread == BLOCK - 1u {
         let all = before + own;
         if AGAIN == 0u {
-            // Only noise has more edges; the caller retries with a larger depth step.
-            counts[FOUND_EDGES] = all;
-            counts[EDGES] = select(all, 0u, all > frame.max_entries);
-            counts[NEXT] = counts[EDGES];
+            counts[EDGES] = all;
+            counts[NEXT] = all;
         } else {
-            mixed[0] = vec4(all, counts[FOUND_EDGES], 0u, 0u);
+            var found = 0u;
+            for (var size = 0u; size < SIZES; size++) {
+                found += counts[STEP_SIZES + size];
+            }
+            mixed[0] = vec4(all, found, 0u, 0u);
         }
     }
     for (var k = begin; k < end; k++) {

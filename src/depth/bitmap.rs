@@ -49,6 +49,12 @@ impl Bitmap {
         self.words[y * self.across + x / WORD] |= 1 << (x % WORD);
     }
 
+    /// Clears the bit of a pixel.
+    #[inline(always)]
+    pub fn unset(&mut self, x: usize, y: usize) {
+        self.words[y * self.across + x / WORD] &= !(1 << (x % WORD));
+    }
+
     /// Sets the pixels that are set in `bits`, in the layout that [`Self::word_at`] returns.
     #[inline(always)]
     pub fn set_word(&mut self, x: usize, y: usize, bits: u64) {

@@ -56,7 +56,13 @@ pub struct Matte {
 impl Matte {
     /// Returns the largest valid number of pixels on outlines, with an alpha below 1: with more, the depth is noise.
     pub fn max_pixels(width: usize, height: usize) -> usize {
-        width * height / 4
+        width * height / 2
+    }
+
+    /// Returns the largest number of pixels beside depth discontinuities that are matted; the rest of
+    /// [`Self::max_pixels`] is for thin structures that continue from them.
+    pub fn max_edges(width: usize, height: usize) -> usize {
+        Self::max_pixels(width, height) / 4 * 3
     }
 
     /// Returns the largest valid number of other pixels, which hide a known surface entirely.

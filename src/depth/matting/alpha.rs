@@ -4,7 +4,9 @@
 
 #![allow(clippy::needless_range_loop)] // Steps and pixels index several arrays at once.
 
+use super::contrast::Color;
 use super::fast_max;
+use super::mixture::ColorBatch;
 
 /// Pixels evaluated at once. The same number on every processor, since the order of the sums over all pixels depends on
 /// it.
@@ -18,8 +20,8 @@ const STEP: f32 = 1.0 / (STEPS - 1) as f32;
 /// Index of one half, and number of samples on the map's side of it.
 const MIDDLE: usize = STEPS / 2;
 const SIDE: usize = STEPS - MIDDLE;
-/// Probability that a pure pixel is an outlier, a spot of a colour that no pixel around has, times a factor that makes
-/// it comparable with the densities.
+/// Density of a pure pixel that is an outlier, a spot of a colour that no pixel around has: its probability, evenly over
+/// all colours.
 pub const OUTLIER: f32 = 0.02;
 
 /// Numbers of a pixel's four sides, and four corners, on its own surface, for outlines that are about straight.
@@ -37,9 +39,11 @@ pub const ALPHA_PRIORS: [[f32; SIDE]; OUTLINES.len() + 2] = [
     [0.100, 0.100, 0.100, 0.100, 0.600],
     [0.060, 0.060, 0.060, 0.060, 0.760],
 ];
-/// Lower bounds of likelihoods: of an alpha, and of a colour off the line between both surfaces.
-pub const MIN_LIKELIHOOD: f32 = 1e-18;
-pub const MIN_OFF_LINE: f32 = 1e-6;
+/// Probability that a pixel is pure though outlines are soft, relative to straight outlines, for the rows of
+/// [`ALPHA_PRIORS`]: less for other outlines, such as hair's, and where the outline passes through the middle.
+pub const PURE_PRIORS: [f32; OUTLINES.len() + 2] = [0.3, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0];
+/// Lower bound of the likelihood of an alpha.
+pub const MIN_LIKELIHOOD: f32 = 1e-12;
 
 /// Labels of an edge pixel, from the depth map.
 #[derive(Clone, Copy, Debug, Default)]
@@ -71,14 +75,11 @@ impl Labels {
     }
 }
 
-/// Colour measurements of several pixels; unused lanes have `is_there` 0.
+/// Several pixels with their labels and the colours of both surfaces around, as a structure of arrays; unused lanes have
+/// `is_there` 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Colors {
-    /// Maximum-likelihood alpha along the line between both colours, below 0 to above 1, and its reciprocal variance.
-    alpha: Lanes,
-    precision: Lanes,
-    /// Squared Mahalanobis distance of the colour to that line.
-    off_line: Lanes,
+    batch: ColorBatch,
     /// Labels, 1 or 0; the last one is 1 if the lane is used.
     is_near: Lanes,
     borders: Lanes,
@@ -86,35 +87,38 @@ pub struct Colors {
     /// Prior probabilities of the own surface's coverage, from one half to 1.
     priors: [Lanes; SIDE],
     is_there: Lanes,
-    /// Probability of an outlier, times the standard deviation of alpha.
+    /// See [`PURE_PRIORS`].
+    pure_prior: Lanes,
+    /// Density of outliers of the own surface.
     outlier: Lanes,
 }
 
 impl Colors {
     pub const NONE: Self = Self {
-        alpha: [0.0; LANES],
-        precision: [1.0; LANES],
-        off_line: [0.0; LANES],
+        batch: ColorBatch::NONE,
         is_near: [0.0; LANES],
         borders: [0.0; LANES],
         is_thin: [0.0; LANES],
         priors: [[0.0; LANES]; SIDE],
         is_there: [0.0; LANES],
+        pure_prior: [0.0; LANES],
         outlier: [0.0; LANES],
     };
 
-    /// Sets lane `k`; `off_line` only if the background is known.
+    /// Sets lane `k` to a pixel's `own` light, its labels and both surfaces around; `has_background` if the far one is
+    /// that behind this very pixel.
     #[inline(always)]
-    pub fn set_lane(&mut self, k: usize, labels: Labels, (alpha, precision): (f32, f32), off_line: Option<f32>) {
+    pub fn set_lane(&mut self, k: usize, labels: Labels, own: [f32; 3], surfaces: [Color; 2], has_background: bool) {
         let Labels { is_near, borders, outline, is_thin } = labels;
         let number = |is: bool| f32::from(u8::from(is));
-        (self.alpha[k], self.precision[k], self.off_line[k]) = (alpha, precision, off_line.unwrap_or(0.0));
+        self.batch.set_lane(k, surfaces, own, 0.0);
         (self.is_near[k], self.borders[k], self.is_thin[k]) = (number(is_near), number(borders), number(is_thin));
         for (priors, prior) in self.priors.iter_mut().zip(ALPHA_PRIORS[usize::from(outline)]) {
             priors[k] = prior;
         }
         // With a known background, a far pixel is no outlier.
-        (self.is_there[k], self.outlier[k]) = (1.0, OUTLIER * number(is_near || off_line.is_none()));
+        self.pure_prior[k] = PURE_PRIORS[usize::from(outline)];
+        (self.is_there[k], self.outlier[k]) = (1.0, OUTLIER * number(is_near || !has_background));
     }
 }
 
@@ -138,21 +142,14 @@ impl Evidence {
     pub fn new(colors: &Colors) -> Self {
         let mut evidence = Self { is_near: colors.is_near, borders: colors.borders, ..Self::default() };
         // Steps outside, lanes inside, so that every inner loop becomes vector code.
-        let (mut alphas, mut fits) = ([0.0; LANES], [0.0; LANES]);
-        for k in 0..LANES {
-            let alpha = colors.alpha[k];
-            let alpha = if alpha > -0.3 { alpha } else { -0.3 };
-            alphas[k] = if alpha < 1.3 { alpha } else { 1.3 };
-            // A colour off the line between both surfaces is no mixture of them, such as a lone hair beside a face.
-            fits[k] = colors.is_there[k] * fast_max(fast_exp(-colors.off_line[k]), MIN_OFF_LINE);
-        }
+        let regular = colors.batch.regularized();
         let mut likelihoods = [[0.0; LANES]; STEPS];
         let mut all = [[0.0; LANES]; 2];
         for (step, likelihoods) in likelihoods.iter_mut().enumerate() {
             let tried = step as f32 * STEP;
+            let densities = regular.densities(tried);
             for k in 0..LANES {
-                let off = tried - alphas[k];
-                let likely = fits[k] * fast_max(fast_exp(-0.5 * colors.precision[k] * off * off), MIN_LIKELIHOOD);
+                let likely = colors.is_there[k] * fast_max(densities[k], MIN_LIKELIHOOD);
                 likelihoods[k] = likely;
                 all[0][k] += likely;
                 all[1][k] += likely * tried;
@@ -179,7 +176,7 @@ impl Evidence {
         }
         for k in 0..LANES {
             let pure = if colors.is_near[k] > 0.0 { likelihoods[STEPS - 1][k] } else { likelihoods[0][k] };
-            evidence.pure[k] = fast_max(pure, colors.outlier[k] / colors.precision[k].sqrt());
+            evidence.pure[k] = colors.pure_prior[k] * fast_max(pure, colors.outlier[k]);
         }
         evidence
     }
@@ -194,7 +191,7 @@ pub struct Prior {
 }
 
 /// Initial value, lower bound of both, upper bounds, and number of iterations.
-pub const PRIOR: Prior = Prior { mixed: 0.3, wrong: 0.01 };
+pub const PRIOR: Prior = Prior { mixed: 0.6, wrong: 0.01 };
 pub const PRIOR_MIN: f32 = 0.002;
 pub const PRIOR_MAX: Prior = Prior { mixed: 0.9, wrong: 0.3 };
 pub const PRIOR_ROUNDS: usize = 4;
@@ -250,7 +247,7 @@ impl Prior {
 /// Returns e to a power <= 0, with a relative error of about 2e-7; practically 0 below e^-80. Free of branches and
 /// calls, so that loops vectorise, and identical on every processor.
 #[inline(always)]
-fn fast_exp(power: f32) -> f32 {
+pub(super) fn fast_exp(power: f32) -> f32 {
     // Adding this rounds a small number to an integer, in the lowest bits of the mantissa.
     const ROUND: f32 = 12_582_912.0;
     /// ln 2 in two parts (Cody and Waite): the first one times a small integer is exact.

@@ -14,7 +14,9 @@ mod edges;
 pub mod gpu;
 mod known_background;
 pub mod mask;
+mod mixture;
 mod passes;
+mod rank;
 mod symmetric;
 mod trace;
 
@@ -37,17 +39,16 @@ use alpha::{Evidence, LANES, Labels, Prior};
 use clusters::{Clusters, FrameView};
 use edges::EdgeDetector;
 use passes::{ComputeAlphas, EvaluateColors, SeparateColors};
+use rank::keep_rarest_steps;
 use trace::{Trace, WideRegions};
 
 /// Minimum difference of the CoC across a depth discontinuity, in pixels, for its pixels to be matted.
 pub const MIN_STEP_PX: f32 = 0.5;
 /// Above this alpha, a pixel counts as pure.
-const NEARLY_PURE: f32 = 0.98;
+const NEARLY_PURE: f32 = 0.97;
 
 /// Maximum distance of traced pixels from an edge, in pixels.
 const MAX_STEPS: usize = 16;
-/// Number of minimum depth steps that are tried if there are too many edges, each twice the previous one.
-const MAX_DOUBLINGS: usize = 8;
 /// Minimum number of pixels per thread.
 const MIN_PIXELS: usize = 256;
 
@@ -176,8 +177,8 @@ impl Matting {
     }
 
     /// Finds the mixed pixels beside steps of inverse depth larger than `depth_step`, in 1/m. Finds none if the map and
-    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::max_pixels`] edge
-    /// pixels, only the largest steps count.
+    /// the picture differ in size, or `depth_step` is not finite. If there are more than [`Matte::max_edges`] edge
+    /// pixels, only those count whose size of step the fewest have.
     pub fn find_mixed_pixels(&mut self, map: &mut DepthMap, color: &ColorImage, depth_step: f32) {
         self.find_with_background(&mut ThreadPool::new("matte", 1), (map, color), depth_step, None);
     }
@@ -196,16 +197,10 @@ impl Matting {
         if map.size() != color.size() || map.metres.is_empty() || !depth_step.is_finite() {
             return;
         }
-        let most = Matte::max_pixels(map.width as usize, map.height as usize);
-        let least_step = depth_step;
-        let depth_steps = || std::iter::successors(Some(least_step), |step| Some(2.0 * step)).take(MAX_DOUBLINGS);
+        let most = Matte::max_edges(map.width as usize, map.height as usize);
         if self.gpu.try_run("finds mattes", |gpu| {
-            for depth_step in depth_steps() {
-                if gpu.find_mixed_pixels((map, color), device_frame.clone(), depth_step, background)? <= most {
-                    log_noise(depth_step > least_step, &mut self.is_noise_logged);
-                    break;
-                }
-            }
+            let edges = gpu.find_mixed_pixels((map, color), device_frame.clone(), depth_step, background)?;
+            log_noise(edges > most, &mut self.is_noise_logged);
             Ok(())
         }) {
             return;
@@ -214,16 +209,13 @@ impl Matting {
         let Self { arch, light, at_edge, edge_detector, edges, pixels, clusters, .. } = self;
         let arch = *arch;
         let size = (map.width as usize, map.height as usize);
-        let fits = |depth_step: &f32| {
-            edge_detector.find_edges((arch, workers), map, *depth_step, at_edge, edges);
-            edges.len() <= most
-        };
-        // Only noise has more edges than `most`: then the largest steps are what counts.
-        let Some(depth_step) = depth_steps().find(fits) else { return };
-        log_noise(depth_step > least_step, &mut self.is_noise_logged);
+        edge_detector.find_edges((arch, workers), map, depth_step, at_edge, edges);
+        let is_whole = keep_rarest_steps(edges, at_edge, depth_step, most);
+        log_noise(!is_whole, &mut self.is_noise_logged);
         clusters.clear(size);
         pixels.clear();
-        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
+        pixels
+            .extend(edges.iter().filter_map(|edge| Some(Pixel::new(*edge, clusters.request_model(depth_step, edge)?))));
         let (metres, rgb) = (&map.metres, &color.rgb[..]);
         clusters.fit_models((arch, workers), &FrameView { size, metres, depth_step, at_edge, rgb, light }, 0);
         // Without pure pixels of both surfaces, a colour says nothing about alpha.
@@ -293,7 +285,9 @@ impl Matting {
 /// Logs once that a map is noise.
 fn log_noise(is_noise: bool, is_logged: &mut bool) {
     if is_noise && !std::mem::replace(is_logged, true) {
-        tracing::info!("the depth has jumps nearly everywhere: outlines are separated only where it jumps most");
+        tracing::info!(
+            "the depth has jumps nearly everywhere: outlines are separated only where it jumps as much as in few other places"
+        );
     }
 }
 

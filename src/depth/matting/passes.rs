@@ -6,8 +6,8 @@ use pulp::WithSimd;
 use super::Pixel;
 use super::alpha::{Colors, Evidence, LANES, Prior};
 use super::clusters::{Clusters, FrameView};
-use super::contrast::MixedBatch;
 use super::known_background::KnownBackground;
+use super::mixture::ColorBatch;
 use crate::frame::MixedPixel;
 
 /// Evaluates pixels against the colours of the surfaces around.
@@ -44,13 +44,8 @@ impl WithSimd for EvaluateColors<'_> {
                     Some(light) if contrast.is_plausible_far(light) => Some(light),
                     _ => None,
                 };
-                let discriminant = contrast.discriminant(pixel.background);
-                let alpha = discriminant.alpha(pixel.own);
-                let off_line = match pixel.background {
-                    Some(light) => Some(contrast.off_line_distance(light, pixel.own, alpha)),
-                    None => None,
-                };
-                colors.set_lane(k, pixel.edge.labels, (alpha, discriminant.precision), off_line);
+                let surfaces = contrast.colors_with_background(pixel.background);
+                colors.set_lane(k, pixel.edge.labels, pixel.own, surfaces, pixel.background.is_some());
             }
             *evidence = Evidence::new(&colors);
         }
@@ -97,7 +92,7 @@ impl WithSimd for SeparateColors<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { clusters, width, pixels, order, mixed } = self;
-        let mut batch = MixedBatch::default();
+        let mut batch = ColorBatch::NONE;
         for (order, mixed) in order.chunks(LANES).zip(mixed.chunks_mut(LANES)) {
             for (k, &place) in order.iter().enumerate() {
                 let pixel = &pixels[place as usize];

@@ -15,7 +15,7 @@ use crate::frame::DepthMap;
 pub(in super::super) const AT_EDGE_WEIGHT: f32 = 4e-4;
 /// Distance from an edge within which the map may be wrong, in pixels, and the weight of pixels there.
 pub(in super::super) const CLOSE_PX: usize = 3;
-pub(in super::super) const CLOSE_WEIGHT: f32 = 0.02;
+pub(in super::super) const CLOSE_WEIGHT: f32 = 0.05;
 
 /// Pixels of a cell. Every other one is sampled, as on a chessboard, which suffices.
 const PIXELS: usize = CELL_PX * CELL_PX;

@@ -21,7 +21,7 @@ impl Passes {
             let bits = if again { &b.marks } else { &b.edges };
             let blocks = (words as u32).div_ceil(BLOCK);
             [
-                over(shaders::COUNT, again, None, &[bits, &b.counts], [blocks, 1]),
+                over(shaders::COUNT, again, None, &[&b.metres, bits, &b.counts], [blocks, 1]),
                 over(shaders::TOTAL, again, None, &[&b.counts, &b.mixed], [1, 1]),
             ]
         };

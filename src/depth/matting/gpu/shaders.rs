@@ -2,20 +2,22 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::alpha::{MIN_LIKELIHOOD, MIN_OFF_LINE, OUTLIER, PRIOR, PRIOR_MAX, PRIOR_MIN, PRIOR_ROUNDS, STEPS};
+use super::super::alpha::{MIN_LIKELIHOOD, OUTLIER, PRIOR, PRIOR_MAX, PRIOR_MIN, PRIOR_ROUNDS, STEPS};
 use super::super::clusters::{
     AT_EDGE_WEIGHT, CELL_PX, CLOSE_PX, CLOSE_WEIGHT, FALLOFF_PX, FRINGE_ALPHA, FRINGE_ALPHAS, FRINGE_PIXELS,
     RADII_CELLS,
 };
-use super::super::contrast::{MAX_DEVIATION, MAX_PRECISION, QUANTISATION, SHRINKAGE};
+use super::super::contrast::{MAX_DEVIATION, QUANTISATION, SHRINKAGE, UNCERTAIN_WEIGHT, UNCERTAINTY};
+use super::super::mixture::{ALPHA_VARIANCE, ISOTROPY, MIN_VARIANCE, NOISE};
+use super::super::rank::{BITS_BELOW_SIZE, SIZES};
 use super::super::trace::MIN_TRACED_ALPHA;
 use super::super::{MAX_STEPS, NEARLY_PURE};
 use crate::compute::device::{Shader, shader};
 use crate::frame::DepthMap;
 
 /// Edge detection, and the number of set bits before each word and each block of words.
-pub const FIND_EDGES: Shader = shader!(matte: "common"; "find_edges");
-pub const COUNT: Shader = shader!(matte: "common"; "count", "sum");
+pub const FIND_EDGES: Shader = shader!(matte: "common"; "find_edges", "rank");
+pub const COUNT: Shader = shader!(matte: "common"; "count", "rank", "sum");
 pub const TOTAL: Shader = shader!(matte: "common"; "total", "sum");
 /// The colours of surfaces.
 pub const CLUSTERS: Shader = shader!(matte: "common"; "clusters", "light");
@@ -45,7 +47,7 @@ pub const BLOCK: u32 = 256;
 /// Workgroups of `matte/expect`, and threads of each; threads of all other passes over entries.
 pub const LANES: u32 = 64;
 /// Length of `counts` before the blocks' counts.
-pub const COUNTS: usize = 64;
+pub const COUNTS: usize = 64 + SIZES;
 /// Maximum number of runs of a pass, plus one.
 pub const RUNS: usize = MAX_STEPS + 1;
 /// Maximum number of storage buffers of a pass.
@@ -58,9 +60,10 @@ pub fn workgroup_count(count: usize) -> u32 {
 
 // `matte/common`, `matte/clusters` and `matte/compare` repeat these as array lengths and bit positions.
 const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MAX_STEPS < 20);
+const _: () = assert!(SIZES == 32 && BITS_BELOW_SIZE == 22);
 
 /// Returns the `override` constants of `matte/common.wgsl`; `again` for the second run of a pass.
-pub fn constants(again: bool) -> [(&'static str, f64); 31] {
+pub fn constants(again: bool) -> [(&'static str, f64); 35] {
     [
         ("AGAIN", u8::from(again).into()),
         ("MIN_DEPTH_BITS", DepthMap::MIN_M.to_bits().into()),
@@ -79,10 +82,14 @@ pub fn constants(again: bool) -> [(&'static str, f64); 31] {
         ("SHRINKAGE", SHRINKAGE.into()),
         ("QUANTISATION", QUANTISATION.into()),
         ("MAX_DEVIATION", MAX_DEVIATION.into()),
-        ("MAX_CERTAINTY", MAX_PRECISION.into()),
+        ("ISOTROPY", ISOTROPY.into()),
+        ("NOISE", NOISE.into()),
+        ("ALPHA_VARIANCE", ALPHA_VARIANCE.into()),
+        ("MIN_VARIANCE", MIN_VARIANCE.into()),
+        ("UNCERTAINTY", UNCERTAINTY.into()),
+        ("UNCERTAIN_WEIGHT", UNCERTAIN_WEIGHT.into()),
         ("OUTLIER", OUTLIER.into()),
         ("MIN_LIKELIHOOD", MIN_LIKELIHOOD.into()),
-        ("MIN_OFF_LINE", MIN_OFF_LINE.into()),
         ("FIRST_MIXED", PRIOR.mixed.into()),
         ("FIRST_WRONG", PRIOR.wrong.into()),
         ("PRIOR_MIN", PRIOR_MIN.into()),
