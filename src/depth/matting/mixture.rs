@@ -13,7 +13,7 @@ use super::{fast_max, fast_min};
 /// off that line says that it is no mixture.
 pub(super) const ISOTROPY: f32 = 0.002;
 /// Variance of the noise of a pixel, in linear light.
-pub(super) const NOISE: f32 = 1e-5;
+pub(super) const NOISE: f32 = 2e-5;
 /// Minimum variance of alpha: a surface's mean colour is never that at the pixel.
 pub(super) const ALPHA_VARIANCE: f32 = 1e-3;
 /// Lower bound of the variance of one channel given the others, beyond rounding.

@@ -13,7 +13,7 @@ use crate::depth::bitmap::{Bitmap, set_bits};
 use crate::frame::DepthMap;
 
 /// Minimum alpha of a pixel whose neighbours are traced, where the map has no edge.
-pub const MIN_TRACED_ALPHA: f32 = 0.1;
+pub const MIN_TRACED_ALPHA: f32 = 0.05;
 
 /// Follows thin structures to where the depth map does not have them: from pixels with some alpha that are far in the
 /// map, to their neighbours, if these have some alpha too (hysteresis, as in Canny's edge tracing).
