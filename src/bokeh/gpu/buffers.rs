@@ -78,6 +78,13 @@ pub fn work_count(plan: &Plan) -> usize {
     MAX_LAYERS + 1 + MAX_BINS * plan.ladder.max_terms().div_ceil(4)
 }
 
+/// Returns the bytes of the largest matte.
+pub fn mixed_bytes(plan: &Plan) -> u64 {
+    let is_layered = plan.compositing == Compositing::Layers;
+    let pixels = if is_layered { Matte::capacity(plan.width, plan.height).max(1) } else { 1 };
+    (pixels * size_of::<MixedPixel>()) as u64
+}
+
 /// Returns the bytes of the largest buffer of filters or kernels.
 pub fn max_filter_bytes(plan: &Plan) -> u64 {
     let of_bank = |bank: &FilterBank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
@@ -113,7 +120,6 @@ impl Buffers {
         let pyramid_pixels = if layered { count_pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let grid = if layered { width.div_ceil(SILHOUETTE_CELL) * height.div_ceil(SILHOUETTE_CELL) } else { 1 };
-        let mixed = if layered { Matte::capacity(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { concatenate_kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
         Self {
@@ -122,7 +128,7 @@ impl Buffers {
             work: buffer("work", work_bytes, Usage::UNIFORM),
             color: storage("color", packed_picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
-            mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
+            mixed: storage("mixed", mixed_bytes(plan) as usize / 4),
             ranges: storage("ranges", tiles * 2),
             marks: storage("marks", grid * 4),
             row_dilated: storage("along", grid * 4),

@@ -71,6 +71,7 @@ impl GpuBokeh {
         let rows = capacity.rows * plan.ladder.max_terms().min(4);
         // A pixel is four halves, also in each of the up to four terms per row pass.
         let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::max_filter_bytes(plan));
+        let largest = largest.max(buffers::mixed_bytes(plan));
         if largest > allowed {
             return Err(GpuError::Failed(format!(
                 "{}: pictures of {} x {} need buffers of {largest} bytes, and this GPU allows {allowed}; use --backend \
