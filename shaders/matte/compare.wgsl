@@ -26,8 +26,8 @@ fn with_isotropy(color: Color) -> Symmetric {
     return Symmetric(color.row + vec3(part, 0.0, 0.0), color.rest + vec3(part, 0.0, part));
 }
 
-// Density of a Gaussian at a distance from its mean, without the constant factor, by the decomposition of its covariance
-// into a triangular and a diagonal matrix (Cholesky).
+// Density at a distance from the mean, without the constant factor: a Student t distribution in three dimensions with five
+// degrees of freedom. By the decomposition of its covariance into a triangular and a diagonal matrix (Cholesky).
 fn density(m: Symmetric, off: vec3<f32>) -> f32 {
     let of_x = m.row.yz / m.row.x;
     let y = max(m.rest.x - of_x.x * m.row.y, MIN_VARIANCE);
@@ -37,7 +37,8 @@ fn density(m: Symmetric, off: vec3<f32>) -> f32 {
     let off_y = off.y - of_x.x * off.x;
     let off_z = off.z - of_x.y * off.x - z_of_y * off_y;
     let distance = off.x * off.x / m.row.x + off_y * off_y / y + off_z * off_z / z;
-    return exp(-min(0.5 * distance, 80.0)) * inverseSqrt(m.row.x * y * z);
+    let tail = 1.0 + distance / 5.0;
+    return inverseSqrt(m.row.x * y * z) / (tail * tail * tail * tail);
 }
 
 // Computes the likelihoods of an entry's colour, whose model has both surfaces.

@@ -244,26 +244,5 @@ impl Prior {
     }
 }
 
-/// Returns e to a power <= 0, with a relative error of about 2e-7; practically 0 below e^-80. Free of branches and
-/// calls, so that loops vectorise, and identical on every processor.
-#[inline(always)]
-pub(super) fn fast_exp(power: f32) -> f32 {
-    // Adding this rounds a small number to an integer, in the lowest bits of the mantissa.
-    const ROUND: f32 = 12_582_912.0;
-    /// ln 2 in two parts (Cody and Waite): the first one times a small integer is exact.
-    const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
-    const BIAS: u32 = 127;
-    const MANTISSA_BITS: u32 = f32::MANTISSA_DIGITS - 1;
-    let power = fast_max(power, -80.0);
-    let rounded = power * std::f32::consts::LOG2_E + ROUND;
-    let whole = rounded - ROUND;
-    let rest = power - whole * LN_2[0] - whole * LN_2[1];
-    let mut value = 1.0 / 720.0;
-    for factor in [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
-        value = value * rest + factor;
-    }
-    value * f32::from_bits((rounded.to_bits() << MANTISSA_BITS).wrapping_add(BIAS << MANTISSA_BITS))
-}
-
 #[cfg(test)]
 mod tests;

@@ -45,7 +45,7 @@ use trace::{Trace, WideRegions};
 /// Minimum difference of the CoC across a depth discontinuity, in pixels, for its pixels to be matted.
 pub const MIN_STEP_PX: f32 = 0.5;
 /// Above this alpha, a pixel counts as pure.
-const NEARLY_PURE: f32 = 0.97;
+const NEARLY_PURE: f32 = 0.98;
 
 /// Maximum distance of traced pixels from an edge, in pixels.
 const MAX_STEPS: usize = 16;
