@@ -103,7 +103,7 @@ impl Labels {
         while self.mark(grid, frame, seeds, reach_px) > budget {
             reach_px *= LESS;
             if reach_px < 1.0 {
-                // So many outlines are noise.
+                // More outlines than that are noise.
                 self.mask.fill(0);
                 self.rows = (0, 0);
                 return;

@@ -160,7 +160,7 @@ impl<'a> FilledCells<'a> {
     fn hidden_pixel(&self, x: usize, y: usize) -> MixedPixel {
         let at = y * self.grid.size.0 + x;
         let (own, behind) = (self.frame.light_at(at), self.light_at(x, y));
-        // Depth is that of the cell: between two surfaces there is none.
+        // Depth is that of the cell: a mean of two surfaces is on neither.
         let far_m = self.filled[y / CELL * self.grid.across + x / CELL][3].recip();
         MixedPixel {
             at: at as u32,
