@@ -74,7 +74,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
             }
             "stereo" => "common line path root row touch",
             "refine" => "common ends lanes select window",
-            _ => "background claim common compare contrast enter light prior run sum surfaces weights",
+            _ => "background claim common compare contrast enter light prior rank run sum surfaces weights",
         };
         let pass = if folder == "blur" { file.clone() } else { format!("{folder}_{file}") };
         let known = shared.split(' ').any(|shared| shared == file)

@@ -214,8 +214,7 @@ impl Matting {
         log_noise(!is_whole, &mut self.is_noise_logged);
         clusters.clear(size);
         pixels.clear();
-        pixels
-            .extend(edges.iter().filter_map(|edge| Some(Pixel::new(*edge, clusters.request_model(depth_step, edge)?))));
+        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.request_model(depth_step, edge))));
         let (metres, rgb) = (&map.metres, &color.rgb[..]);
         clusters.fit_models((arch, workers), &FrameView { size, metres, depth_step, at_edge, rgb, light }, 0);
         // Without pure pixels of both surfaces, a colour says nothing about alpha.

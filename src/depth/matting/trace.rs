@@ -58,7 +58,7 @@ impl WithSimd for Trace<'_> {
                     marked += 1;
                     let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::BEYOND, ..edge };
                     let count = clusters.model_count();
-                    let Some(model) = clusters.request_model(depth_step, &next) else { continue };
+                    let model = clusters.request_model(depth_step, &next);
                     if model as usize == count {
                         clusters.fit_models(
                             (arch, workers),

@@ -19,8 +19,6 @@ pub(in super::super) const FALLOFF_PX: f32 = 7.0;
 /// Weights of the fringe from which it starts to count, and from which it counts fully: a lone hair is mostly
 /// background.
 pub(in super::super) const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
-/// Maximum number of models, per cell on average: the time for a map that is noise has a bound.
-const MAX_MODELS_PER_CELL: usize = 2;
 /// Minimum number of cells, and of models, per thread.
 const MIN_CELLS: usize = 16;
 const MIN_MODELS: usize = 32;
@@ -63,24 +61,19 @@ impl Clusters {
     }
 
     /// Returns the index of the model for an edge pixel: the latest one of its cell if the surfaces are as far, or a
-    /// new one, to be fitted by [`Self::fit_models`]; none if there are too many.
+    /// new one, to be fitted by [`Self::fit_models`].
     #[inline(always)]
-    pub(in super::super) fn request_model(&mut self, depth_step: f32, edge: &EdgePixel) -> Option<u32> {
-        let most_models = self.place.len() * MAX_MODELS_PER_CELL;
+    pub(in super::super) fn request_model(&mut self, depth_step: f32, edge: &EdgePixel) -> u32 {
         let latest_model = &mut self.latest_model[edge.y as usize / CELL_PX * self.across + edge.x as usize / CELL_PX];
         let same = |ColorModel { edge: e, .. }: &ColorModel| {
             (e.near - edge.near).abs() <= depth_step && (e.far - edge.far).abs() <= depth_step
         };
         if let Some(last) = latest_model.checked_sub(1).filter(|&last| same(&self.models[last as usize])) {
-            return Some(last);
-        }
-        // Only noise has more.
-        if self.models.len() >= most_models {
-            return None;
+            return last;
         }
         self.models.push(ColorModel { edge: *edge, contrast: None });
         *latest_model = self.models.len() as u32;
-        Some(*latest_model - 1)
+        *latest_model - 1
     }
 
     /// Returns the number of models.

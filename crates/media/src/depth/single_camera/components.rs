@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-/// Number of predicates of [`Components::find`].
-const PREDICATES: usize = 4;
+/// Maximum number of predicates of [`Components::find`].
+const MAX_PREDICATES: usize = 4;
 
 /// A component, connected by sides (4-connected).
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +14,7 @@ pub struct Component {
     /// Number of pixels.
     pub pixels: u32,
     /// Numbers of pixels that satisfy each predicate.
-    pub matches: [u32; PREDICATES],
+    pub matches: [u32; MAX_PREDICATES],
     /// Whether it touches the border of the picture.
     pub touches_border: bool,
 }
@@ -36,7 +36,7 @@ pub struct Components {
 impl Components {
     /// Finds the components of a mask `width` pixels wide, and counts the pixels of each that satisfy each
     /// predicate.
-    pub fn find(&mut self, persons: &[bool], width: usize, predicates: impl Fn(usize) -> [bool; PREDICATES]) {
+    pub fn find<const N: usize>(&mut self, persons: &[bool], width: usize, predicates: impl Fn(usize) -> [bool; N]) {
         let Self { runs, components } = self;
         runs.clear();
         components.clear();
@@ -52,9 +52,10 @@ impl Components {
                     parent: component,
                     is_person: same[0],
                     pixels: same.len() as u32,
-                    matches: pixels
-                        .clone()
-                        .fold([0; PREDICATES], |counts, at| add(counts, predicates(at).map(u32::from))),
+                    matches: pixels.clone().fold([0; MAX_PREDICATES], |mut counts, at| {
+                        counts.iter_mut().zip(predicates(at)).for_each(|(count, is)| *count += u32::from(is));
+                        counts
+                    }),
                     touches_border: at_side || y == 0 || (y + 1) * width == persons.len(),
                 });
                 // Runs above that end before this one are irrelevant to all later ones.
@@ -86,7 +87,7 @@ impl Components {
     }
 }
 
-fn add(a: [u32; PREDICATES], b: [u32; PREDICATES]) -> [u32; PREDICATES] {
+fn add(a: [u32; MAX_PREDICATES], b: [u32; MAX_PREDICATES]) -> [u32; MAX_PREDICATES] {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
@@ -129,7 +130,7 @@ mod tests {
         ];
         let persons: Vec<bool> = picture.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let mut components = Components::default();
-        components.find(&persons, 10, |at| [at % 10 < 5, false, false, false]);
+        components.find(&persons, 10, |at| [at % 10 < 5]);
         let mut matches: Vec<_> = components
             .iter_all()
             .map(|part| (part.is_person, part.pixels, part.matches[0], part.touches_border))
