@@ -132,7 +132,9 @@ fn mattes_agree_whatever_the_size() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn mattes_agree_whatever_the_noise() {
     let device = device();
-    let count = |noise| same(&device, &format!("{noise}"), ONE_IN, &[scene((200, 150), 2, noise)]);
+    // Where all is noise, rounding decides more comparisons, and what is traced from there.
+    let one_in = |noise| if noise > 0.2 { ONE_IN_OF_FEW } else { ONE_IN };
+    let count = |noise| same(&device, &format!("{noise}"), one_in(noise), &[scene((200, 150), 2, noise)]);
     let counts = [0.0, 0.01, 0.05, 0.1, 0.14, 0.3, 1.5].map(count);
     assert!(counts[3] > 2 * counts[0], "more edges, more to mix: {counts:?}");
     assert!(

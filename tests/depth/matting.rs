@@ -213,7 +213,7 @@ fn behind_a_wire_mesh_a_soft_outline_stays_soft() {
 /// A wall of stripes in two colours: a pixel of one of them is that wall, though not their mean.
 #[test]
 fn a_pixel_of_a_striped_wall_is_no_mixture() {
-    let stripes = |x: u32, y: u32| light(if (x + y) / 5 % 2 == 0 { [200, 170, 60] } else { [40, 34, 12] });
+    let stripes = |x: u32, y: u32| light(if ((x + y) / 5).is_multiple_of(2) { [200, 170, 60] } else { [40, 34, 12] });
     let (picture, mut map) = scene(|_, _| light([60, 70, 190]), stripes);
     Matting::default().find_mixed_pixels(&mut map, &picture, JUMP);
     for pixel in &map.matte.pixels {

@@ -249,6 +249,10 @@ impl Matting {
         let (mut prior, mut steps) = (Prior::default(), 0);
         loop {
             let found = evaluated.end..pixels.len();
+            // Where several pixels trace the same one in a step, the first in raster order counts.
+            if steps > 0 {
+                pixels[found.clone()].sort_unstable_by_key(|pixel| pixel.index(size.0));
+            }
             evidence.resize(found.len().div_ceil(LANES), Evidence::default());
             // Evaluate the new pixels, then trace one step further from those with some alpha.
             let each = bands::chunk_len(found.len(), MIN_PIXELS).next_multiple_of(LANES);

@@ -2,9 +2,7 @@
 //! `shaders/`. The map and its picture are uploaded, or copied on the device if it has refined the map; the mixed
 //! pixels are read back, and nothing in between. The remembered background is uploaded when it has changed.
 //!
-//! It differs from the CPU in two ways. A comparison with a threshold may go either way where rounding decides it. And
-//! if several pixels trace the same one in a step, the first in raster order counts here; on the CPU, the first one
-//! traced.
+//! It differs from the CPU where rounding decides a comparison with a threshold, which may then go either way.
 
 mod buffers;
 mod passes;
