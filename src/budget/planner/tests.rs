@@ -52,7 +52,7 @@ fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
         // Together too late: not with less effort.
         (27.0, 22.0, plan(1, 0, 1)),
         (40.0, 20.0, plan(1, 0, 1)),
-        (50.0, 28.0, plan(1, 0, 0)),
+        (48.0, 25.5, plan(1, 0, 0)),
         // No effort makes depth fast enough for each frame; the blur keeps most of its budget.
         (70.0, 15.0, plan(2, 0, 1)),
         (70.0, 20.0, plan(2, 0, 0)),
