@@ -222,6 +222,6 @@ mod tests {
         }
         let psnr = off.map(|off| [0, 1].map(|part: usize| 10.0 * (65025.0 * counts[part] / off[part]).log10()));
         println!("PSNR in dB, all and at outlines: {:.1?} held, {:.1?} moved", psnr[0], psnr[1]);
-        assert!((0..2).all(|part| psnr[1][part] > psnr[0][part] + 1.5), "{psnr:?}");
+        assert!((0..2).all(|part| psnr[1][part] > psnr[0][part] + 1.2), "{psnr:?}");
     }
 }

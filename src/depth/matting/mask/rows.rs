@@ -51,8 +51,8 @@ fn lanes_of([red, green, blue]: &[Vec<f32>; 3], x: usize) -> [Lanes; 3] {
 
 /// Mask value from which a pixel is near whatever its colour, and the value up to which colours alone may make it far: an arm
 /// looks like a wall behind it, and the outline of a coarse mask is off by some pixels.
-const TRUSTED: f32 = 0.75;
-const DOUBTED: f32 = 0.65;
+const TRUSTED: f32 = 0.9;
+const DOUBTED: f32 = 0.7;
 
 /// Place of each lane's colour between both surfaces' (0: far, 1: near), and its reciprocal variance.
 type Discriminants = (Lanes, Lanes);
