@@ -55,10 +55,11 @@ impl MaskPostProcessor {
         self.is_waiting = false;
     }
 
-    /// Sets which pixels of the next mask have long been at rest. Without this call, nothing counts as that.
-    pub fn set_at_rest(&mut self, at_rest: impl Iterator<Item = bool>) {
+    /// Sets which pixels of the next mask have long been at rest, by filling a vector. Without this call, nothing counts as
+    /// that.
+    pub fn set_at_rest(&mut self, fill: impl FnOnce(&mut Vec<bool>)) {
         self.at_rest.clear();
-        self.at_rest.extend(at_rest);
+        fill(&mut self.at_rest);
     }
 
     /// Whether the last mask had a sure region that takes a second mask to be a person.
@@ -323,7 +324,8 @@ mod tests {
         let alone = mask(|x, y| f32::from(u8::from(rucksack(x, y))));
         let (mut postprocessor, mut decided) = (MaskPostProcessor::default(), Mask::default());
         let mut sharp = |mask: &Mask, at_rest: &dyn Fn(usize, usize) -> bool| {
-            postprocessor.set_at_rest((0..SIZE.0 * SIZE.1).map(|at| at_rest(at % SIZE.0, at / SIZE.0)));
+            postprocessor
+                .set_at_rest(|all| all.extend((0..SIZE.0 * SIZE.1).map(|at| at_rest(at % SIZE.0, at / SIZE.0))));
             postprocessor.postprocess(mask, &mask.alpha, false, &mut decided);
             [decided.alpha[40 * SIZE.0 + 4], decided.alpha[40 * SIZE.0 + 32]]
         };

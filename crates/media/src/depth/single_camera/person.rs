@@ -88,9 +88,8 @@ impl PersonSegmenter {
         self.smoothed.resize(size.0, size.1);
         Arch::new().dispatch(Smooth { new: &self.decoded, previous_weight, smoothed: &mut self.smoothed.alpha });
         self.seen_ns = Some(time_ns);
-        let network = &self.picture_network;
-        let rests = |at| network.rested_pictures(at, (size.0 as usize, size.1 as usize)) >= MIN_REST_PICTURES;
-        self.mask_postprocess.set_at_rest((0..self.smoothed.alpha.len()).map(rests));
+        let (network, size) = (&self.picture_network, (size.0 as usize, size.1 as usize));
+        self.mask_postprocess.set_at_rest(|at_rest| network.append_at_rest(MIN_REST_PICTURES, size, at_rest));
         self.mask_postprocess.postprocess(&self.smoothed, &self.decoded, takes_two, &mut self.mask);
         Ok(())
     }

@@ -171,11 +171,12 @@ impl PictureNetwork {
         self.stillness.as_mut().is_some_and(StillnessDetector::is_still)
     }
 
-    /// Returns for how many pictures the place of pixel `at` of an output of this size (columns, rows) has not changed; 0 if
-    /// that is not watched.
-    pub fn rested_pictures(&self, at: usize, (width, height): (usize, usize)) -> u32 {
-        let (x, y) = (at % width * self.size.0 / width, at / width * self.size.1 / height);
-        self.stillness.as_ref().map_or(0, |stillness| stillness.rested_pictures((x, y), self.size.0))
+    /// Appends to `at_rest` whether each pixel of an output of this size (columns, rows) has not changed for this many
+    /// pictures; nothing if that is not watched.
+    pub fn append_at_rest(&self, pictures: u32, size: (usize, usize), at_rest: &mut Vec<bool>) {
+        if let Some(stillness) = &self.stillness {
+            stillness.append_at_rest(pictures, self.size, size, at_rest);
+        }
     }
 
     /// Runs the network on the picture set by [`Self::set_picture`].

@@ -67,9 +67,25 @@ impl StillnessDetector {
         self.rests.clear();
     }
 
-    /// Returns for how many pictures the place (`x`, `y`) of an input `width` columns wide has not changed.
-    pub fn rested_pictures(&self, (x, y): (usize, usize), width: usize) -> u32 {
-        self.rests.get(y / TILE * width.div_ceil(TILE) + x / TILE).map_or(0, |(_, pictures)| *pictures)
+    /// Appends to `at_rest` whether each pixel of a mask of `width` x `height` has not changed for this many pictures, for
+    /// inputs of `input` columns and rows.
+    pub fn append_at_rest(
+        &self,
+        pictures: u32,
+        input: (usize, usize),
+        (width, height): (usize, usize),
+        at_rest: &mut Vec<bool>,
+    ) {
+        let across = input.0.div_ceil(TILE);
+        // Tile by tile: a division for each pixel takes as long as the rest of the mask's decisions.
+        for y in 0..height {
+            let first = y * input.1 / height / TILE * across;
+            for column in 0..across {
+                let end = ((column + 1) * TILE * width / input.0).min(width);
+                let is_at_rest = self.rests.get(first + column).is_some_and(|(_, rested)| *rested >= pictures);
+                at_rest.resize(y * width + end, is_at_rest);
+            }
+        }
     }
 
     /// Adds row `y` of an input, 8-bit RGB; rows come in order.
