@@ -9,7 +9,7 @@ use super::Vector;
 
 /// Radius in pixels by which the mask of an untextured near surface is dilated: only its outline shows motion.
 const DILATION_PX: usize = 2;
-/// Minimum number of compared pixels of a surface in a cell.
+/// Minimum number of compared pixels of a surface in a cell; half of a cell where that is less, as in small pictures.
 const MIN_PIXELS: u32 = 20;
 /// Number of rows of a cell that are compared.
 const ROWS: usize = 8;
@@ -129,7 +129,8 @@ impl Pictures<'_> {
             sum += difference;
             count += compared;
         }
-        (count >= 3 * MIN_PIXELS).then(|| sum as f32 / count as f32)
+        let min_pixels = MIN_PIXELS.min((self.grid.cell_px * self.grid.cell_px) as u32 / 2);
+        (count >= 3 * min_pixels).then(|| sum as f32 / count as f32)
     }
 }
 

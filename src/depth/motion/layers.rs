@@ -14,6 +14,8 @@ const REST_BOUNDS: (f32, f32) = (2.5, 8.0);
 const WHOLE_CELL_FACTOR: f32 = 0.3;
 /// Maximum ratio of the difference after motion to that at rest; otherwise the motion is unknown.
 const MAX_RESIDUAL_RATIO: f32 = 0.7;
+/// Mean difference after motion, in codes, from which a surface shows something else.
+const UNEXPLAINED_RESIDUAL: f32 = 16.0;
 /// Cost of each pixel of a vector's length, in codes.
 const COST_PER_PX: f32 = 0.1;
 /// Maximum ratio by which a neighbour's vector may be worse to be adopted.
@@ -58,6 +60,11 @@ impl Cell {
 
     pub fn is_moving(&self) -> bool {
         self.surfaces().any(|surface| surface.vector != [0; 2])
+    }
+
+    /// Whether its surfaces look as before, once moved.
+    pub fn is_explained(&self) -> bool {
+        self.surfaces().all(|surface| surface.residual < UNEXPLAINED_RESIDUAL)
     }
 
     /// Returns the surface whose inverse depth is closest to `inverse`.

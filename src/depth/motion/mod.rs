@@ -17,8 +17,22 @@ use blocks::{BlockMatcher, CELL};
 use compare::{Grid, Pictures};
 use layers::Cell;
 
+/// One of so many cells may have changed in a way that no motion explains, as where a near surface uncovers a far one.
+const MAX_UNEXPLAINED: usize = 16;
+
 /// A displacement in pixels: right, down.
 pub type Vector = [i32; 2];
+
+/// What has become of the reference picture in a later one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Nothing moved.
+    Rest,
+    /// Parts of it have moved.
+    Moved,
+    /// Too much of it has changed in a way that no motion explains: something left or came, or another scene is shown.
+    Unexplained,
+}
 
 /// Estimates the motion of a reference picture; owns the memory for it.
 #[derive(Debug, Default)]
@@ -49,11 +63,12 @@ impl MotionEstimator {
         }
     }
 
-    /// Estimates the motion from the reference picture, with its depth `map`, to a later one. Returns whether anything
-    /// moved.
-    pub fn estimate(&mut self, map: &DepthMap, color: &ColorImage) -> bool {
-        let is_alike = (color.width as usize, color.height as usize) == self.grid.size;
-        is_alike && !self.cells.is_empty() && self.arch.dispatch(EstimateMotion { motion: self, map, color })
+    /// Estimates the motion from the reference picture, with its depth `map`, to a later one.
+    pub fn estimate(&mut self, map: &DepthMap, color: &ColorImage) -> Motion {
+        if (color.width as usize, color.height as usize) != self.grid.size || self.cells.is_empty() {
+            return Motion::Rest;
+        }
+        self.arch.dispatch(EstimateMotion { motion: self, map, color })
     }
 
     /// Warps the depth `from` of the reference picture by the estimated motion into `to`, which is a copy of it on
@@ -100,20 +115,26 @@ struct EstimateMotion<'a> {
 }
 
 impl WithSimd for EstimateMotion<'_> {
-    type Output = bool;
+    type Output = Motion;
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> bool {
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Motion {
         let MotionEstimator { rgb, grid, blocks, cells, masks, changes, .. } = self.motion;
         let mut pictures = Pictures { then: rgb, now: &self.color.rgb, map: self.map, grid: *grid, masks };
         let rest_threshold = pictures.compare_at_rest(cells, changes);
         if cells.iter().all(|cell| cell.is_at_rest(rest_threshold)) {
-            return false;
+            return Motion::Rest;
         }
         let across = grid.cell_counts().0;
         blocks.match_blocks(self.color, |(column, row)| cells[row * across + column].is_at_rest(rest_threshold));
         pictures.refine_vectors(cells, blocks, rest_threshold);
         pictures.smooth_vectors(cells, rest_threshold);
-        cells.iter().any(Cell::is_moving)
+        match cells.iter().any(Cell::is_moving) {
+            _ if MAX_UNEXPLAINED * cells.iter().filter(|cell| !cell.is_explained()).count() > cells.len() => {
+                Motion::Unexplained
+            }
+            true => Motion::Moved,
+            false => Motion::Rest,
+        }
     }
 }
 

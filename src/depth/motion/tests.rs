@@ -34,7 +34,7 @@ fn moved(then: &(ColorImage, DepthMap), now: &ColorImage) -> DepthMap {
     let mut motion = MotionEstimator::default();
     motion.set_reference(&then.1, &then.0, DEPTH_STEP);
     let mut map = then.1.clone();
-    if motion.estimate(&then.1, now) {
+    if motion.estimate(&then.1, now) != Motion::Rest {
         motion.warp(&then.1, &mut map);
     }
     map
@@ -151,10 +151,30 @@ fn a_surface_is_asked_for_by_its_depth() {
     let (then, now) = (square([0; 2], [0; 2], false), square([10, 0], [-4, 0], false));
     let mut motion = MotionEstimator::default();
     motion.set_reference(&then.1, &then.0, DEPTH_STEP);
-    assert!(motion.estimate(&then.1, &now.0));
+    assert_eq!(motion.estimate(&then.1, &now.0), Motion::Moved);
     // On both sides of the square's left outline.
     for x in [246, 250, 253] {
         let at = 180 * SIZE.0 + x;
         assert_eq!([NEAR_M, FAR_M].map(|metres| motion.vector_at(at, metres)), [[10, 0], [-4, 0]], "{x}");
     }
+}
+
+#[test]
+fn who_leaves_or_another_scene_is_no_motion() {
+    let estimate = |then: &(ColorImage, DepthMap), now: &ColorImage| {
+        let mut motion = MotionEstimator::default();
+        motion.set_reference(&then.1, &then.0, DEPTH_STEP);
+        motion.estimate(&then.1, now)
+    };
+    let then = square([0; 2], [0; 2], true);
+    for (near, far) in [([0; 2], [0; 2]), ([9, -3], [0; 2]), ([-12, 4], [6, 2]), ([0; 2], [20, 0])] {
+        let expected = if (near, far) == ([0; 2], [0; 2]) { Motion::Rest } else { Motion::Moved };
+        assert_eq!(estimate(&then, &square(near, far, true).0), expected, "{near:?} {far:?}");
+    }
+    let wall = seen(|x, y| (texture(x, y, 2), FAR_M));
+    let other = seen(|x, y| (if (x / 24 + y / 24) % 2 == 0 { 20 } else { 230 }, FAR_M));
+    for now in [&wall, &other] {
+        assert_eq!(estimate(&then, &now.0), Motion::Unexplained);
+    }
+    assert_eq!(estimate(&wall, &then.0), Motion::Unexplained);
 }

@@ -189,7 +189,7 @@ impl<'a> Stage<'a> {
             self.scheduler.iter_mut().for_each(DepthScheduler::discard_held_depth);
         }
         if let Some((field, scheduler)) =
-            self.scheduler.as_mut().and_then(|scheduler| Some((scheduler.reuse_next()?, scheduler)))
+            self.scheduler.as_mut().and_then(|scheduler| Some((scheduler.reuse_next(color)?, scheduler)))
         {
             let mut map = brought.unwrap_or_else(|| pools.depths.take());
             scheduler.warp_reused(&mut map, color);

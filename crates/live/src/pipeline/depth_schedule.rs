@@ -52,9 +52,10 @@ impl<'a> DepthScheduler<'a> {
         self.shared_plan.get().1
     }
 
-    /// Counts a frame; returns the CoC of the last depth if the frame reuses both, `None` if it needs its own.
-    pub(super) fn reuse_next(&mut self) -> Option<CocField> {
-        if self.age >= self.shared_plan.get().0 {
+    /// Counts a frame with the picture `color`; returns the CoC of the last depth if the frame reuses both, `None` if it
+    /// needs its own.
+    pub(super) fn reuse_next(&mut self, color: &ColorImage) -> Option<CocField> {
+        if self.age >= self.shared_plan.get().0 || self.last.is_some() && !self.held.fits(color) {
             self.last = None;
         }
         self.age += 1;
@@ -66,7 +67,7 @@ impl<'a> DepthScheduler<'a> {
         self.last = None;
     }
 
-    /// Writes the held depth, warped to the picture, into `map`.
+    /// Writes the held depth, warped to the picture of the frame that reuses it, into `map`.
     pub(super) fn warp_reused(&mut self, map: &mut DepthMap, color: &ColorImage) {
         self.held.warp_to(map, color);
     }
@@ -99,7 +100,7 @@ mod tests {
                 scheduler.discard_held_depth();
             }
             let mut frame = |_| {
-                let held = scheduler.reuse_next().is_some();
+                let held = scheduler.reuse_next(&ColorImage::new(2, 2)).is_some();
                 if !held {
                     scheduler.store_depth(&map, CocField::Uniform { radius_px: 1.0 }, &ColorImage::new(2, 2));
                 }

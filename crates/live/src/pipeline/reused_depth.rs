@@ -1,7 +1,7 @@
 //! Depth that several frames share.
 
 use bokehcam::color::srgb_to_linear_table;
-use bokehcam::depth::motion::MotionEstimator;
+use bokehcam::depth::motion::{Motion, MotionEstimator};
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::optics::CocField;
 
@@ -12,6 +12,8 @@ pub(super) struct ReusedDepth {
     map: DepthMap,
     light: Box<[f32; 256]>,
     motion: MotionEstimator,
+    /// Whether anything moved to the last picture that was compared.
+    has_moved: bool,
 }
 
 /// Smallest alpha by which a colour difference is divided: below, noise would dominate.
@@ -21,7 +23,7 @@ const SEPARATE_MOTION_COC_PX: f32 = 1.0;
 
 impl ReusedDepth {
     pub fn new() -> Self {
-        Self { map: DepthMap::default(), light: srgb_to_linear_table(), motion: MotionEstimator::default() }
+        Self { map: DepthMap::default(), light: srgb_to_linear_table(), motion: MotionEstimator::default(), has_moved: false }
     }
 
     /// Returns whether no map was kept yet.
@@ -50,11 +52,19 @@ impl ReusedDepth {
         }
     }
 
-    /// Writes the kept map, warped to the later picture `color`, into `map`.
+    /// Compares the later picture `color` with that of the kept map. Returns whether the map, once moved, fits: where
+    /// a person has left, it would keep sharp what the person hid.
+    pub fn fits(&mut self, color: &ColorImage) -> bool {
+        let motion = self.motion.estimate(&self.map, color);
+        self.has_moved = motion != Motion::Rest;
+        motion != Motion::Unexplained
+    }
+
+    /// Writes the kept map, warped to the picture `color` that was compared last, into `map`.
     pub fn warp_to(&mut self, map: &mut DepthMap, color: &ColorImage) {
         copy_map(&self.map, map);
-        let Self { map: held, light, motion } = self;
-        let moved = motion.estimate(held, color);
+        let Self { map: held, light, motion, has_moved } = self;
+        let moved = *has_moved;
         if moved {
             motion.warp(held, map);
         }
@@ -137,10 +147,12 @@ mod tests {
         let mut held = ReusedDepth::new();
         held.store(&then.1, &then.0, &FIELD);
         let mut given = DepthMap::default();
+        assert!(held.fits(&now.0));
         held.warp_to(&mut given, &now.0);
         assert!(given.metres == now.1.metres, "the map has moved");
         let places = |map: &DepthMap| map.matte.pixels.iter().map(|pixel| pixel.at).collect::<Vec<_>>();
         assert_eq!(places(&given), places(&now.1));
+        assert!(held.fits(&then.0));
         held.warp_to(&mut given, &then.0);
         assert!(given.metres == then.1.metres && places(&given) == places(&then.1), "what rests is where it was");
     }
@@ -161,16 +173,19 @@ mod tests {
         let mut held = ReusedDepth::new();
         held.store(&map, &color, &FIELD);
         let mut given = DepthMap::default();
+        assert!(held.fits(&color));
         held.warp_to(&mut given, &color);
         for (a, b) in given.matte.pixels.iter().zip(&map.matte.pixels) {
             assert!(a.difference.iter().zip(&b.difference).all(|(a, b)| (a - b).abs() < 1e-5), "{a:?} {b:?}");
         }
         // The person has left: the mixed pixel shows the background, so both its surfaces have that colour.
         color.rgb[3..6].copy_from_slice(&[30, 60, 200]);
+        assert!(held.fits(&color));
         held.warp_to(&mut given, &color);
         assert!(given.matte.pixels[1].difference.iter().all(|difference| difference.abs() < 1e-5));
         // A measured map has no matte here: each frame estimates its own.
         held.store(&DepthMap { subject_m: None, ..map }, &color, &FIELD);
+        assert!(held.fits(&color));
         held.warp_to(&mut given, &color);
         assert!(given.matte.pixels.is_empty() && given.subject_m.is_none());
     }
@@ -203,6 +218,7 @@ mod tests {
             let mut held = ReusedDepth::new();
             held.store(&then.1, &then.0, &CocField::Depth(lens));
             let mut moved = DepthMap::default();
+            assert!(held.fits(&now.0));
             held.warp_to(&mut moved, &now.0);
             let own = blurred(&now.0, &now.1);
             let others = [&then.1, &moved].map(|map| blurred(&now.0, map));

@@ -239,9 +239,10 @@ fn a_network_that_fails_shows_no_room() {
 
 #[test]
 fn measured_depth_that_is_missing_shows_no_room() {
-    for measured in [false, true] {
-        // No map, an empty one, or one of the frame, for some frames each, and an empty one first.
-        let depth = depth_by(|FrameInput { stamp, color, .. }, map| {
+    for (measured, takes_ms) in [(false, 0), (true, 0), (true, 6)] {
+        // No map, an empty one, or one of the frame, for some frames each, and an empty one first. Slow ones are shared.
+        let depth = depth_by(move |FrameInput { stamp, color, .. }, map| {
+            thread::sleep(Duration::from_millis(takes_ms));
             map.resize(SIZE.0, SIZE.1);
             map.metres.fill(0.0);
             match stamp.index / 5 % 4 {
@@ -259,7 +260,7 @@ fn measured_depth_that_is_missing_shows_no_room() {
         });
         let (report, sent) = play(1000, depth, &look(FocusRule::Metres(1.0)), |call, _| run(Run { measured, ..call }));
         assert!(report.unwrap().frames.dropped.unpaired > 0);
-        assert_eq!(sent.leaks(), BTreeSet::new(), "measured: {measured}");
+        assert_eq!(sent.leaks(), BTreeSet::new(), "measured: {measured}, {takes_ms} ms");
         assert!(sent.persons.load(Ordering::SeqCst) > 100);
     }
 }

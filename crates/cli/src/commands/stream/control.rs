@@ -181,7 +181,7 @@ impl ControllableRun for Stream {
 
     fn switch_pictures(&self, on: Option<bool>) -> Result<bool, Answer> {
         let shutter = &self.run.shutter;
-        let on = on.unwrap_or_else(|| shutter.is_closed());
+        let Some(on) = on else { return Ok(!shutter.toggle()) };
         shutter.close(!on);
         Ok(on)
     }

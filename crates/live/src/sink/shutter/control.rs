@@ -39,6 +39,12 @@ impl ShutterControl {
         self.closed.store(closed, Ordering::Release);
     }
 
+    /// Closes it if it is open, and opens it if it is closed, in one step, as several clients may ask at once. Returns
+    /// whether it is closed now.
+    pub fn toggle(&self) -> bool {
+        !self.closed.fetch_not(Ordering::AcqRel)
+    }
+
     /// Whether it is closed.
     pub fn is_closed(&self) -> bool {
         self.closed.load(Ordering::Acquire)

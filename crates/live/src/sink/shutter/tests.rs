@@ -1,4 +1,5 @@
 use std::sync::Mutex;
+use std::thread;
 
 use super::*;
 
@@ -131,4 +132,16 @@ fn a_copy_is_in_full_colour_and_what_is_yuyv_stays_behind_a_closed_shutter_as_we
     assert!(shutter.write_yuyv(&mut yuyv, 2 * PERIOD_NS).unwrap().is_continue());
     let cards: Vec<bool> = got.lock().unwrap().iter().map(|got| got.0).collect();
     assert_eq!(cards, [false, false, true]);
+}
+
+#[test]
+fn of_clients_that_toggle_at_once_each_is_told_what_it_did() {
+    let (_shutter, control, ..) = shutter();
+    let closed: i32 = thread::scope(|scope| {
+        let toggle = || (0..10_001).map(|_| if control.toggle() { 1 } else { -1 }).sum::<i32>();
+        let clients = [(); 3].map(|()| scope.spawn(toggle));
+        clients.into_iter().map(|client| client.join().unwrap()).sum()
+    });
+    assert_eq!(closed, 1, "closed once more than opened");
+    assert!(control.is_closed());
 }
