@@ -6,7 +6,6 @@ struct Frame {
     focus_m: f32,           // inverse depth is this over the depth
     rescale: f32,           // factor for the stored inverse depth, whose unit has changed
     max_hole_px: u32,       // largest hole that may be the near side's, in pixels
-    is_empty: u32,          // 1 without any known depth: the last filled map is used
     is_fresh: u32,          // 1 without a last frame
 }
 

@@ -56,10 +56,6 @@ fn refine_prepare(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let k = id.y * frame.size.x + id.x;
     colors[k] = pack_color(k);
-    if frame.is_empty == 1u {
-        flags[k] = UNKNOWN;
-        return;
-    }
     let depth_m = resample_depth(id.xy);
     metres[k] = depth_m;
     flags[k] = select(0u, UNKNOWN | HOLE, depth_m == 0.0);

@@ -16,7 +16,7 @@ use pulp::{Arch, WithSimd};
 use super::guided_fill::{GuidedHoleFill, Run};
 use crate::frame::{ColorImage, DepthMap};
 
-/// Fills depth maps; owns its buffers and the last map that had any depth.
+/// Fills depth maps; owns its buffers.
 #[derive(Debug, Default)]
 pub struct HoleFiller {
     arch: Arch,
@@ -26,51 +26,32 @@ pub struct HoleFiller {
     filled_m: Vec<f32>,
     /// Nearest known depth above, then below, per column.
     column_m: Vec<f32>,
-    last_good: DepthMap,
     guided: GuidedHoleFill,
 }
 
 impl HoleFiller {
-    /// Creates a filler without a last map.
+    /// Creates a filler.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Fills every unknown depth of `map`, in time linear in its pixels. A map without any known depth becomes a copy
-    /// of the last good one of its size; without one it stays unknown (0) everywhere.
+    /// Fills every unknown depth of `map`, in time linear in its pixels. A map without any known depth stays unknown (0)
+    /// everywhere.
     pub fn fill(&mut self, map: &mut DepthMap) {
-        if self.fill_from_background(map) {
-            self.store(map);
-        }
+        self.fill_from_background(map);
     }
 
     /// Fills like [`HoleFiller::fill`], then corrects by `color`, the picture of the map: a pixel filled from the
     /// background takes the depth of the near object beside it if it has that object's colour.
     pub fn fill_guided(&mut self, map: &mut DepthMap, color: &ColorImage) {
-        if self.fill_without_storing(map, color) {
-            self.store(map);
-        }
-    }
-
-    /// Fills like [`HoleFiller::fill_guided`] without keeping the map: returns whether to keep it, with
-    /// [`HoleFiller::store_by_swap`].
-    pub(super) fn fill_without_storing(&mut self, map: &mut DepthMap, color: &ColorImage) -> bool {
-        let is_good = self.fill_from_background(map);
-        if is_good {
+        if self.fill_from_background(map) {
             self.guided.assign_to_foreground(map, &self.holes, color);
         }
-        is_good
     }
 
     /// Returns the unknown runs of the last map, row by row.
     pub(super) fn holes(&self) -> &[Run] {
         &self.holes
-    }
-
-    /// Keeps a map by swapping buffers: `map` then has the content of an earlier one.
-    pub(super) fn store_by_swap(&mut self, map: &mut DepthMap) {
-        self.last_good.resize(map.width, map.height);
-        mem::swap(&mut self.last_good.metres, &mut map.metres);
     }
 
     /// Fills the holes; returns whether any depth was known.
@@ -79,11 +60,7 @@ impl HoleFiller {
         holes.clear();
         arch.dispatch(FindHoleRuns { map, holes });
         if holes.iter().map(|hole| hole.range().len()).sum::<usize>() == map.metres.len() {
-            if self.last_good.size() == map.size() {
-                map.metres.copy_from_slice(&self.last_good.metres);
-            } else {
-                map.metres.fill(0.0);
-            }
+            map.metres.fill(0.0);
             return false;
         }
         let is_full = arch.dispatch(FillPass { map, holes, filled_m, column_m });
@@ -102,11 +79,6 @@ impl HoleFiller {
             arch.dispatch(FillPass { map, holes: left, filled_m, column_m });
         }
         true
-    }
-
-    fn store(&mut self, map: &DepthMap) {
-        self.last_good.resize(map.width, map.height);
-        self.last_good.metres.copy_from_slice(&map.metres);
     }
 }
 

@@ -146,7 +146,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
     have_layouts(&ALL, expected);
     {
         use refine::{Frame, Wave};
-        let frame = layout!(Frame { size, map_size, focus_m, rescale, max_hole_px, is_empty, is_fresh });
+        let frame = layout!(Frame { size, map_size, focus_m, rescale, max_hole_px, is_fresh });
         have_layouts(&refine::ALL, [frame, layout!(Wave { first, at, marks })]);
     }
     {

@@ -149,7 +149,6 @@ impl Refiner {
 
     /// Discards the state of earlier frames, for a new scene.
     pub fn reset(&mut self) {
-        self.filler = HoleFiller::new();
         self.temporal.reset();
         self.focus = Focus::default();
         self.gpu.worker_mut().iter_mut().for_each(gpu::GpuRefiner::reset);
@@ -208,7 +207,7 @@ impl Refiner {
         time_ns: Option<u64>,
     ) {
         self.upsampler.resize(workers, map, color.size());
-        let is_good = self.filler.fill_without_storing(map, color);
+        self.filler.fill_guided(map, color);
         // The filler fills all holes or none: the first pixel shows which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.reset();
@@ -222,9 +221,6 @@ impl Refiner {
         filler.holes().iter().for_each(|hole| unknown[hole.pixels(width)].fill(true));
         let measured_noise = noise_estimator.estimate(|at| focus_m / map.metres[at], |at| unknown[at], size);
         smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
-        if is_good && !self.single {
-            filler.store_by_swap(map);
-        }
         let noise = noise_estimator.estimate(|at| inverse[at], |at| unknown[at], size);
         let depth_step = MIN_DEPTH_STEP.max(DEPTH_STEP_SIGMAS * noise);
         outlines.shift(inverse, unknown, width, distance_px, depth_step);

@@ -49,8 +49,6 @@ struct Resources {
     map_size: (u32, u32),
     columns: Vec<Tap>,
     rows: Vec<Tap>,
-    /// Whether a map without holes is on the device.
-    has_filled: bool,
     /// Time and focus distance of the frame of the temporal state.
     last: Option<(u64, f32)>,
     /// Whether the last refined map and its picture are on the device.
@@ -76,7 +74,7 @@ impl GpuRefiner {
     /// Discards the state of all frames.
     pub fn reset(&mut self) {
         if let Some(resources) = &mut self.resources {
-            (resources.has_filled, resources.last) = (false, None);
+            resources.last = None;
         }
     }
 
@@ -134,7 +132,6 @@ impl Resources {
             map_size,
             columns,
             rows,
-            has_filled: false,
             last: None,
             is_on_device: false,
             copies,
@@ -185,9 +182,8 @@ impl Resources {
         if !map.metres.is_empty() && self.map_size != map.size() {
             self.set_map_size(device, map.size())?;
         }
-        let is_empty = map.metres.is_empty() || !self.has_known_depth(map);
-        // Without any depth now or before, the map is unknown everywhere, as on the CPU.
-        if is_empty && !self.has_filled {
+        // Without any depth, the map is unknown everywhere, as on the CPU.
+        if map.metres.is_empty() || !self.has_known_depth(map) {
             map.resize(color.width, color.height);
             map.metres.fill(0.0);
             self.last = None;
@@ -201,33 +197,24 @@ impl Resources {
             focus_m,
             rescale: last.map_or(1.0, |(_, before_m)| focus_m / before_m),
             max_hole_px: guided_fill::max_hole_px(color.width as usize) as u32,
-            is_empty: is_empty.into(),
             is_fresh: last.is_none().into(),
             ..Frame::default()
         };
         device.upload(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
         device.upload(&self.buffers.rgb, 0, &color.rgb);
-        if !is_empty {
-            device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
-        }
-        self.run_passes(device, map, is_empty, last.is_none())?;
-        (self.has_filled, self.is_on_device) = (true, true);
+        device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
+        self.run_passes(device, map, last.is_none())?;
+        self.is_on_device = true;
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
 
     /// Runs the passes and reads the refined map back.
-    fn run_passes(
-        &mut self,
-        device: &Device,
-        map: &mut DepthMap,
-        is_empty: bool,
-        is_fresh: bool,
-    ) -> Result<(), GpuError> {
+    fn run_passes(&mut self, device: &Device, map: &mut DepthMap, is_fresh: bool) -> Result<(), GpuError> {
         let Buffers { counts, rgb, refined, readback, .. } = &mut self.buffers;
         let mut recorder = Recorder::new(device, self.timestamps.as_mut());
         recorder.encoder.clear_buffer(counts, 0, None);
-        self.passes.record(&mut recorder, is_empty, is_fresh);
+        self.passes.record(&mut recorder, is_fresh);
         let copy = self.copies.try_take();
         for (from, to) in copy.iter().flat_map(|copy| [(&*refined, &copy.metres), (rgb, &copy.rgb)]) {
             recorder.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());

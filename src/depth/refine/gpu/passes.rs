@@ -143,11 +143,11 @@ impl Passes {
         self.prepare = PassBuilder { device, size: [size.0, size.1], b }.create_prepare();
     }
 
-    /// Records all passes of a frame; `is_empty` if its map has no known depth, `is_fresh` without a last frame.
-    pub fn record(&self, recorder: &mut Recorder, is_empty: bool, is_fresh: bool) {
-        let fill = self.fill.iter().filter(|_| !is_empty);
+    /// Records all passes of a frame; `is_fresh` without a last one.
+    pub fn record(&self, recorder: &mut Recorder, is_fresh: bool) {
         let change = self.change.iter().filter(|_| !is_fresh);
-        let passes = [&self.prepare].into_iter().chain(fill).chain(&self.align).chain(change).chain([&self.steady]);
+        let passes =
+            [&self.prepare].into_iter().chain(&self.fill).chain(&self.align).chain(change).chain([&self.steady]);
         passes.for_each(|pass| recorder.record(pass));
     }
 }

@@ -117,10 +117,7 @@ pub struct Frame {
     pub focus_m: f32,
     pub rescale: f32,
     pub max_hole_px: u32,
-    pub is_empty: u32,
     pub is_fresh: u32,
-    /// Padding to the size of the uniform.
-    pub unused: u32,
 }
 
 /// `Wave` of `refine/vote.wgsl`, which documents the fields.
