@@ -7,7 +7,7 @@ use crate::compute::{Device, DeviceFrame};
 use crate::depth::background::BackgroundMemory;
 use crate::depth::fill::HoleFiller;
 use crate::depth::focus::{Focus, FocusRule};
-use crate::depth::hidden::HiddenSurfaces;
+use crate::depth::hidden::{HiddenSurfaces, Hiding};
 use crate::depth::matting::{self, Matting};
 use crate::depth::refine::{MapCorrection, Refiner};
 use crate::frame::{ColorImage, DepthMap};
@@ -294,8 +294,8 @@ impl CocCalculator {
         }
     }
 
-    /// Adds what the surfaces of a map hide to its matte: from memory, and behind near things by an estimate where there is
-    /// none. If `taken_ns` is given, the memory first learns from this frame.
+    /// Adds what the surfaces of a map hide to its matte: from memory, and behind near things, and in a single picture behind
+    /// the subject, by an estimate where there is none. If `taken_ns` is given, the memory first learns from this frame.
     fn fill_hidden_background(
         &mut self,
         map: &mut DepthMap,
@@ -303,7 +303,7 @@ impl CocCalculator {
         field: &CocField,
         taken_ns: Option<u64>,
     ) {
-        let Self { background, hidden, workers, .. } = self;
+        let Self { background, hidden, workers, single, postprocessor, .. } = self;
         let (CocField::Depth(lens), false) = (field, map.is_smooth) else { return };
         if let Some(background) = background {
             if let Some(taken_ns) = taken_ns {
@@ -311,7 +311,11 @@ impl CocCalculator {
             }
             background.reveal_background(workers, map, color, lens);
         }
-        hidden.add_to_matte(workers, map, color, lens);
+        hidden.add_to_matte(workers, map, color, lens, Hiding::NEAR);
+        // A stream has its memory for what the subject hides, and no time; a map that is complete was blurred in one before.
+        if *single && !matches!(postprocessor, Postprocessor::Keep) {
+            hidden.add_to_matte(workers, map, color, lens, Hiding::SUBJECT);
+        }
     }
 }
 

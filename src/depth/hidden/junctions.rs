@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::labels::Labels;
 use super::survey::{Found, OutlinePoint, SAME_PX, Seed};
-use super::{CELL, Cells, Frame, Grid, NEAR_PX};
+use super::{CELL, Cells, Frame, Grid};
 use crate::frame::resize_buffer;
 
 /// Longest distance from an outline's end to the near thing, in pixels.
@@ -226,13 +226,14 @@ fn gap_px(grid: &Grid, frame: &Frame, nearest_px: &[f32], point: &OutlinePoint) 
     };
     let columns = cells(&xs, grid.columns);
     let mut rows = cells(&ys, grid.rows);
-    let is_near = rows.any(|y| nearest_px[y * grid.across..][columns.clone()].iter().any(|px| *px < NEAR_PX));
+    let is_near =
+        rows.any(|y| nearest_px[y * grid.across..][columns.clone()].iter().any(|px| grid.hiding.is_front(*px)));
     if !is_near {
         return None;
     }
     let mut least = f32::INFINITY;
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
-        if frame.coc_px(y * width + x) < NEAR_PX {
+        if grid.hiding.is_front(frame.coc_px(y * width + x)) {
             least = least.min((x as f32 - point.at.0).hypot(y as f32 - point.at.1));
         }
     }

@@ -160,14 +160,19 @@ impl<'a> FilledCells<'a> {
     fn hidden_pixel(&self, x: usize, y: usize) -> MixedPixel {
         let at = y * self.grid.size.0 + x;
         let (own, behind) = (self.frame.light_at(at), self.light_at(x, y));
+        let cell = y / CELL * self.grid.across + x / CELL;
         // Depth is that of the cell: a mean of two surfaces is on neither.
-        let far_m = self.filled[y / CELL * self.grid.across + x / CELL][3].recip();
+        let far_m = self.filled[cell][3].recip();
+        let background_alpha = self.grid.hiding.fade.map_or(1.0, |fade| {
+            let limit_px = (fade * self.labels.behind_px[cell].abs()).max(1.0);
+            (1.0 - self.labels.square(cell).sqrt() / limit_px).max(0.0)
+        });
         MixedPixel {
             at: at as u32,
             near_m: self.frame.metres[at],
             far_m,
             alpha: 1.0,
-            background_alpha: 1.0,
+            background_alpha,
             difference: [own[0] - behind[0], own[1] - behind[1], own[2] - behind[2]],
         }
     }

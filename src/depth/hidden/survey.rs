@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use pulp::WithSimd;
 
-use super::{CELL, CellRows, Frame, Grid, NEAR_PX};
+use super::{CELL, CellRows, Frame, Grid, Hiding};
 use crate::frame::{DepthMap, Matte, MixedPixel};
 
-/// Relative step of the CoC from which the farther side of two pixels is another surface, behind a near one and behind
+/// Relative step of the CoC from which the farther side of two pixels is another surface, behind one in front and behind
 /// others, and the smallest such step, in pixels.
-pub const NEAR_STEP: f32 = 0.35;
+pub const FRONT_STEP: f32 = 0.35;
 const FAR_STEP: f32 = 0.25;
 pub const MIN_STEP_PX: f32 = 1.0;
 /// CoC difference up to which pixels show the same surface, in pixels.
@@ -17,7 +17,7 @@ pub const SAME_PX: f32 = 1.5;
 /// Columns that are looked at together: most have no outline.
 const CHUNK: usize = 16;
 
-/// A pixel on the outline of a near surface.
+/// A pixel on the outline of a surface that hides others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed {
     /// Column and row, and those of the pixel beside it that shows the surface behind.
@@ -28,7 +28,7 @@ pub struct Seed {
     pub behind_px: f32,
 }
 
-/// A place on an outline between two surfaces that are not near.
+/// A place on an outline between two surfaces that are not in front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlinePoint {
     /// Position, in pixels, between the centres of two pixels.
@@ -68,17 +68,17 @@ struct Rows {
 
 /// Steps: [`Rows::right`].
 const NONE: u8 = 0;
-const NEAR: u8 = 1;
+const FRONT: u8 = 1;
 const OUTLINE: u8 = 2;
 
 /// Returns what kind of step is between two pixels with these CoC.
 #[inline(always)]
-fn step_between(a_px: f32, b_px: f32) -> u8 {
+fn step_between(a_px: f32, b_px: f32, hiding: &Hiding) -> u8 {
     let (near_px, far_px) = if a_px < b_px { (a_px, b_px) } else { (b_px, a_px) };
-    let is_near = near_px < NEAR_PX;
-    let relative = near_px.abs() * if is_near { NEAR_STEP } else { FAR_STEP };
+    let is_front = hiding.is_front(near_px);
+    let relative = near_px.abs() * if is_front { FRONT_STEP } else { FAR_STEP };
     let is_step = far_px - near_px >= if relative > MIN_STEP_PX { relative } else { MIN_STEP_PX };
-    u8::from(is_step) * if is_near { NEAR } else { OUTLINE }
+    u8::from(is_step) * if is_front { FRONT } else { OUTLINE }
 }
 
 /// Surveys some rows of cells.
@@ -95,7 +95,7 @@ impl WithSimd for Survey<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        let (width, height) = self.grid.size;
+        let Grid { size: (width, height), hiding, .. } = *self.grid;
         let Found { seeds, outlines, rows } = &mut *self.found;
         seeds.clear();
         outlines.clear();
@@ -110,9 +110,9 @@ impl WithSimd for Survey<'_> {
             scratch.advance(is_first);
             for k in if is_first { 0..4 } else { 2..4 } {
                 let row = (CELL * y + k).saturating_sub(1).min(height - 1);
-                scratch.read(k, &self.frame, row * width + columns.start..row * width + columns.end);
+                scratch.read(k, &self.frame, &hiding, row * width + columns.start..row * width + columns.end);
             }
-            scratch.find_steps();
+            scratch.find_steps(&hiding);
             scratch.mark_mixed(&mut mixed, CELL * y, width, &columns);
             for x in (0..columns.len()).step_by(CHUNK) {
                 let here = x..(x + CHUNK).min(columns.len());
@@ -171,10 +171,10 @@ impl Survey<'_> {
         for r in 0..CELL {
             for k in 0..CELL {
                 cocs_px[r][k] = rows.coc_px[r + 1][x + k + 1];
-                is_source[r][k] = !rows.mixed[r][x + k] && !rows.is_beside_near(r + 1, x + k + 1);
+                is_source[r][k] = !rows.mixed[r][x + k] && !rows.is_beside_front(r + 1, x + k + 1);
                 let at = (first + x + k, CELL * y + r);
                 if at.0 < width && at.1 < height {
-                    rows.collect(self.found, r + 1, x + k + 1, at);
+                    rows.collect(self.found, &self.grid.hiding, r + 1, x + k + 1, at);
                 }
             }
         }
@@ -221,7 +221,7 @@ impl Rows {
 
     /// Reads row `k` from the pixels at `range`.
     #[inline(always)]
-    fn read(&mut self, k: usize, frame: &Frame, range: Range<usize>) {
+    fn read(&mut self, k: usize, frame: &Frame, hiding: &Hiding, range: Range<usize>) {
         let (row, count) = (&mut self.coc_px[k], range.len());
         for (coc_px, metres) in row[1..].iter_mut().zip(&frame.metres[range]) {
             *coc_px = frame.lens.coc_px(*metres);
@@ -231,16 +231,16 @@ impl Rows {
         row[count + 1..].fill(last_px);
         let (row, right) = (&self.coc_px[k], &mut self.right[k]);
         for (x, step) in right[..count + 2].iter_mut().enumerate() {
-            *step = step_between(row[x], row[x + 1]);
+            *step = step_between(row[x], row[x + 1], hiding);
         }
     }
 
     #[inline(always)]
-    fn find_steps(&mut self) {
+    fn find_steps(&mut self, hiding: &Hiding) {
         for (k, down) in self.down.iter_mut().enumerate() {
             let (above, below) = (&self.coc_px[k], &self.coc_px[k + 1]);
             for ((step, a_px), b_px) in down.iter_mut().zip(above).zip(below) {
-                *step = step_between(*a_px, *b_px);
+                *step = step_between(*a_px, *b_px, hiding);
             }
         }
     }
@@ -284,23 +284,23 @@ impl Rows {
         ]
     }
 
-    /// Whether a pixel is beside a near surface in front of its own: the camera mixes both there.
+    /// Whether a pixel is beside a surface in front of its own: the camera mixes both there.
     #[inline(always)]
-    fn is_beside_near(&self, row: usize, x: usize) -> bool {
+    fn is_beside_front(&self, row: usize, x: usize) -> bool {
         let own_px = self.coc_px[row][x];
-        self.around(row, x).iter().any(|&(step, other_px, _)| step == NEAR && other_px < own_px)
+        self.around(row, x).iter().any(|&(step, other_px, _)| step == FRONT && other_px < own_px)
     }
 
     /// Collects the outlines at a pixel of the picture.
     #[inline(always)]
-    fn collect(&self, found: &mut Found, row: usize, x: usize, (column, line): (usize, usize)) {
+    fn collect(&self, found: &mut Found, hiding: &Hiding, row: usize, x: usize, (column, line): (usize, usize)) {
         let (own_px, around) = (self.coc_px[row][x], self.around(row, x));
-        let behind = around.iter().filter(|(step, other_px, _)| *step == NEAR && *other_px > own_px);
+        let behind = around.iter().filter(|(step, other_px, _)| *step == FRONT && *other_px > own_px);
         let farthest = behind.fold(None, |best: Option<&(u8, f32, (i32, i32))>, other| match best {
             Some(best) if best.1 >= other.1 => Some(best),
             _ => Some(other),
         });
-        if let Some(&(_, behind_px, (across, down))) = farthest {
+        if let Some(&(_, behind_px, (across, down))) = farthest.filter(|_| hiding.includes(own_px)) {
             let at = (column as u32, line as u32);
             let behind = (at.0.wrapping_add_signed(across), at.1.wrapping_add_signed(down));
             found.seeds.push(Seed { at, behind, own_px, behind_px });

@@ -4,6 +4,8 @@ use super::*;
 const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 40.0 };
 const NEAR_M: f32 = 1.0 / 2.2;
 const FAR_M: f32 = 10.0;
+/// Pixels beyond the radius that are told.
+const BEYOND: f32 = 2.0;
 /// Surfaces: something near, something at a middle distance, and a wall.
 const NEAR: (f32, [u8; 3]) = (NEAR_M, [255, 0, 0]);
 const MIDDLE: (f32, [u8; 3]) = (1.6, [0, 255, 0]);
@@ -22,7 +24,11 @@ fn draw(width: u32, height: u32, surface: impl Fn(u32, u32) -> (f32, [u8; 3])) -
 }
 
 fn add_to_matte(map: &mut DepthMap, color: &ColorImage, threads: usize) {
-    HiddenSurfaces::default().add_to_matte(&mut ThreadPool::new("test", threads), map, color, &LENS);
+    add_behind(Hiding::NEAR, map, color, threads);
+}
+
+fn add_behind(hiding: Hiding, map: &mut DepthMap, color: &ColorImage, threads: usize) {
+    HiddenSurfaces::default().add_to_matte(&mut ThreadPool::new("test", threads), map, color, &LENS, hiding);
 }
 
 /// Returns the colour that a pixel says is behind it.
@@ -79,7 +85,7 @@ fn only_the_surface_beside_the_outline_goes_on() {
 }
 
 #[test]
-fn what_is_not_in_front_hides_nothing_here_and_what_is_told_stays() {
+fn what_is_not_near_hides_nothing_here_and_what_is_told_stays() {
     let (mut map, color) = draw(64, 48, |x, y| if x < 30 && y > 9 { (1.0, [9; 3]) } else { WALL });
     let told = MixedPixel { at: 700, near_m: 1.0, far_m: 3.0, alpha: 0.5, ..MixedPixel::default() };
     map.matte.pixels = vec![told];
@@ -97,6 +103,37 @@ fn what_is_not_in_front_hides_nothing_here_and_what_is_told_stays() {
     add_to_matte(&mut map, &color, 1);
     assert_eq!(map.matte.pixels.iter().find(|pixel| pixel.at == 20), Some(&told));
     assert!(map.matte.pixels.len() > 400 && map.matte.pixels.is_sorted_by_key(|pixel| pixel.at));
+}
+
+#[test]
+fn behind_the_subject_the_wall_goes_on_for_its_radius_and_fades() {
+    // A subject before the wall, with one mixed pixel, and something near before both.
+    let subject = (1.0, [0, 255, 0]);
+    let scene = |x: u32, y: u32| match () {
+        () if y >= 70 => NEAR,
+        () if x < 40 => subject,
+        () => WALL,
+    };
+    let (mut map, color) = draw(96, 80, scene);
+    let mixed = MixedPixel { at: 30 * 96 + 40, near_m: 1.0, far_m: FAR_M, alpha: 0.5, ..MixedPixel::default() };
+    map.matte.pixels = vec![mixed];
+    add_behind(Hiding::SUBJECT, &mut map, &color, 2);
+    let radius_px = LENS.coc_px(FAR_M);
+    let told = |x: u32, y: u32| map.matte.pixels.iter().find(|pixel| pixel.at == y * 96 + x);
+    assert_eq!(told(40, 30), Some(&MixedPixel { background_alpha: 1.0, ..mixed }), "the wall is known behind it");
+    for y in (0..60).filter(|&y| y != 30) {
+        let weights: Vec<f32> = (0..40).rev().map_while(|x| told(x, y)).map(|pixel| pixel.background_alpha).collect();
+        assert!((weights.len() as f32 - radius_px - BEYOND).abs() <= 2.0, "{} of {radius_px}", weights.len());
+        assert!(weights.is_sorted_by(|a, b| a >= b) && weights[0] > 0.75, "{weights:?}");
+        assert!(weights[(0.75 * radius_px) as usize + 2] == 0.0, "{weights:?}");
+    }
+    for pixel in map.matte.pixels.iter().filter(|pixel| pixel.alpha == 1.0) {
+        assert!(pixel.at / 96 < 70 && pixel.near_m == 1.0, "behind what is near another pass looks");
+        assert!(color_behind(pixel, &color) == WALL.1 && (pixel.far_m / FAR_M - 1.0).abs() < 1e-3, "{pixel:?}");
+    }
+    // What is near hides nothing of the subject's, and the other way round.
+    let (near, far) = (Hiding::NEAR, Hiding::SUBJECT);
+    assert!([-9.0, -2.1, -2.0, 0.0, 1.4, 1.6].iter().all(|&px| !(near.includes(px) && far.includes(px))));
 }
 
 /// Returns a number of 0..n from a seed.
@@ -127,18 +164,19 @@ fn every_map_of_every_size_has_a_valid_matte_that_is_the_same_on_any_number_of_t
                 }
             }
             let same = |a: &MixedPixel, b: &MixedPixel| bytes_of(a) == bytes_of(b);
+            let hiding = if kind % 2 == 0 { Hiding::NEAR } else { Hiding::SUBJECT };
             let before = map.clone();
-            add_to_matte(&mut map, &color, 1);
+            add_behind(hiding, &mut map, &color, 1);
             let pixels = &map.matte.pixels;
             assert!(pixels.len() <= Matte::max_hidden(width as usize, height as usize));
             assert!(pixels.is_sorted_by(|a, b| a.at < b.at));
             for pixel in pixels {
                 assert!(pixel.difference.iter().all(|light| light.is_finite()), "{pixel:?}");
-                assert!(pixel.far_m > 0.0 && LENS.coc_px(pixel.near_m) < NEAR_PX, "{pixel:?}");
+                assert!(pixel.far_m > 0.0 && hiding.includes(LENS.coc_px(pixel.near_m)), "{pixel:?}");
             }
             for threads in [2, 5] {
                 let mut other = before.clone();
-                add_to_matte(&mut other, &color, threads);
+                add_behind(hiding, &mut other, &color, threads);
                 let is_same = other.matte.pixels.len() == pixels.len()
                     && other.matte.pixels.iter().zip(pixels).all(|(a, b)| same(a, b));
                 assert!(is_same, "{width} x {height}, kind {kind}, {threads} threads");

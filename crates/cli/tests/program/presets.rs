@@ -11,7 +11,7 @@ use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::depth::hidden::HiddenSurfaces;
+use bokehcam::depth::hidden::{HiddenSurfaces, Hiding};
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
@@ -125,7 +125,8 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     let mut map = map.clone();
     if let CocField::Depth(lens) = &field {
         Matting::default().find_mixed_pixels(&mut map, color, lens.inverse_depth_step(matting::MIN_STEP_PX));
-        HiddenSurfaces::default().add_to_matte(&mut ThreadPool::new("depth", 1), &mut map, color, lens);
+        let (mut hidden, mut workers) = (HiddenSurfaces::default(), ThreadPool::new("depth", 1));
+        hidden.add_to_matte(&mut workers, &mut map, color, lens, Hiding::NEAR);
     }
     // A live run uses one executor for all quality levels.
     let settings = look.blur_settings(size, true).unwrap();

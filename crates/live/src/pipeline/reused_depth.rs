@@ -23,7 +23,12 @@ const SEPARATE_MOTION_COC_PX: f32 = 1.0;
 
 impl ReusedDepth {
     pub fn new() -> Self {
-        Self { map: DepthMap::default(), light: srgb_to_linear_table(), motion: MotionEstimator::default(), has_moved: false }
+        Self {
+            map: DepthMap::default(),
+            light: srgb_to_linear_table(),
+            motion: MotionEstimator::default(),
+            has_moved: false,
+        }
     }
 
     /// Returns whether no map was kept yet.
