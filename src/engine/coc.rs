@@ -294,8 +294,8 @@ impl CocCalculator {
         }
     }
 
-    /// Adds what the surfaces of a map hide to its matte: from memory, and behind near things, and in a single picture behind
-    /// the subject, by an estimate where there is none. If `taken_ns` is given, the memory first learns from this frame.
+    /// Adds what the surfaces of a map hide to its matte: from memory; otherwise by an estimate behind near things, and in a
+    /// single picture behind the subject. If `taken_ns` is given, the memory first learns from this frame.
     fn fill_hidden_background(
         &mut self,
         map: &mut DepthMap,

@@ -17,7 +17,7 @@ use blocks::{BlockMatcher, CELL};
 use compare::{Grid, Pictures};
 use layers::Cell;
 
-/// One of so many cells may have changed in a way that no motion explains, as where a near surface uncovers a far one.
+/// One cell of this number may have changed in a way that no motion explains, as where a near surface uncovers a far one.
 const MAX_UNEXPLAINED: usize = 16;
 
 /// A displacement in pixels: right, down.

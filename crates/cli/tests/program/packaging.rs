@@ -294,3 +294,17 @@ fn the_unit_is_confined_by_what_a_user_may_ask_for() {
         assert!(bad.is_none(), "{line}");
     }
 }
+
+/// GNOME refuses an extension that does not list its version.
+#[test]
+fn the_extension_lists_every_gnome_from_45_on() {
+    let metadata: serde_json::Value = serde_json::from_str(&here("packaging/gnome-extension/metadata.json")).unwrap();
+    let listed: Vec<u32> = metadata["shell-version"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|version| version.as_str().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(listed, (45..=51).collect::<Vec<_>>());
+    assert!(here("docs/ctl.md").contains("GNOME, from 45 on"));
+}

@@ -141,7 +141,7 @@ fn list_devices(kind: Kind) -> Vec<Choice> {
     let of_kind = |node: &Node| node.kind == kind && (kind == Kind::Virtual || node.captures);
     let choice = |node: Node| {
         let name = node.path.display().to_string();
-        let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.card) };
+        let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.name()) };
         Choice { name, label }
     };
     node::list_nodes().into_iter().filter(of_kind).map(choice).collect()

@@ -86,7 +86,7 @@ fn join_or(items: &[String], before: &str, none: &str) -> String {
 
 impl fmt::Display for Node {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({})", self.path.display(), if self.card.is_empty() { "no name" } else { &self.card })
+        write!(f, "{} ({})", self.path.display(), if self.card.is_empty() { "no name" } else { self.name() })
     }
 }
 
@@ -195,6 +195,11 @@ impl SystemPaths {
 }
 
 impl Node {
+    /// Returns the card's name as one would say it ([`short_name`]).
+    pub fn name(&self) -> &str {
+        short_name(&self.card)
+    }
+
     /// Fills in what the driver reports about the node.
     fn apply_capability(&mut self, capability: &sys::v4l2_capability) {
         self.card = decode_text(&capability.card);
@@ -231,6 +236,13 @@ pub const LOOPBACK_DRIVER: &str = "v4l2 loopback";
 pub fn decode_text(field: &[u8]) -> String {
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(field.len());
     String::from_utf8_lossy(&field[..end]).trim().to_owned()
+}
+
+/// Returns a card's name without what it says twice: uvcvideo joins the names of product and function, which are mostly
+/// the same, and the kernel cuts both at 31 bytes (`Integrated Camera: Integrated C`).
+pub fn short_name(card: &str) -> &str {
+    let is_repeated = |(product, function): &(&str, &str)| !function.is_empty() && product.starts_with(function);
+    card.split_once(": ").filter(is_repeated).map_or(card, |(product, _)| product)
 }
 
 /// Finds the only capture node whose card name contains `name`, ignoring case. Virtual cameras count only if no real

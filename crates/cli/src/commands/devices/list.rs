@@ -149,12 +149,12 @@ impl DeviceInfo {
     fn lines(&self) -> String {
         let Self { node, holders, formats, controls } = self;
         let mut out = String::new();
-        let card = if node.card.is_empty() { "no name" } else { &node.card };
+        let name = if node.card.is_empty() { "no name" } else { node.name() };
         let mut attachment = vec![node.driver.clone(), node.bus.clone()];
         attachment.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
         attachment.retain(|part| !part.is_empty());
         // Writing to a string cannot fail.
-        let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), attachment.join(", "));
+        let _ = writeln!(out, "  {}  {name}  ({})", node.path.display(), attachment.join(", "));
         let mut line = |text: String| {
             let _ = writeln!(out, "    {text}");
         };

@@ -1,7 +1,8 @@
 //! Checks of the virtual camera: the module v4l2loopback, its options, its nodes.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::cameras::report_denied;
 use super::finding::Finding;
@@ -19,6 +20,10 @@ fn load_command() -> String {
     modprobe_command("/dev/video10".as_ref())
 }
 
+/// Folders of module options: a file hides those of the same name in later folders.
+const OPTION_FOLDERS: [&str; 4] =
+    ["/etc/modprobe.d", "/run/modprobe.d", "/usr/local/lib/modprobe.d", "/usr/lib/modprobe.d"];
+
 /// Number of buffers that PipeWire requests; it refuses a node with fewer.
 const PIPEWIRE_BUFFERS: u32 = 16;
 
@@ -35,6 +40,7 @@ pub fn check_loopback(nodes: &[Node], system: &System) -> Vec<Finding> {
     }
     findings.extend(nodes.iter().map(|node| check_node(node)));
     findings.extend(check_buffers(system));
+    findings.extend(check_options(&OPTION_FOLDERS.map(Path::new)));
     findings
 }
 
@@ -117,9 +123,56 @@ fn check_buffers(system: &System) -> Option<Finding> {
     })
 }
 
+/// Notes that several files set the module's options, such as one of a computer's maker beside the user's own.
+fn check_options(folders: &[&Path]) -> Option<Finding> {
+    let mut files: BTreeMap<_, PathBuf> = BTreeMap::new();
+    for entry in folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten() {
+        if entry.path().extension().is_some_and(|extension| extension == "conf") {
+            files.entry(entry.file_name()).or_insert(entry.path());
+        }
+    }
+    let sets_options = |path: &PathBuf| {
+        fs::read_to_string(path)
+            .is_ok_and(|text| text.lines().any(|line| line.split_whitespace().take(2).eq(["options", "v4l2loopback"])))
+    };
+    let setting: Vec<PathBuf> = files.into_values().filter(sets_options).collect();
+    let (last, others) = setting.split_last().filter(|(_, others)| !others.is_empty())?;
+    let others: Vec<String> = others.iter().map(|path| path.display().to_string()).collect();
+    let found = format!(
+        "{} and {} both set options of v4l2loopback: where they differ, the latter wins",
+        others.join(", "),
+        last.display()
+    );
+    Some(Finding::note(TOPIC, found, "keep one of them, and load the module again: `sudo modprobe -r v4l2loopback`"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_second_file_with_options_of_the_module_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let [own, vendor] = ["etc", "lib"].map(|folder| root.path().join(folder));
+        let missing = root.path().join("none");
+        let check = || check_options(&[&own, &missing, &vendor]);
+        for folder in [&own, &vendor] {
+            fs::create_dir(folder).unwrap();
+        }
+        let write = |path: PathBuf, text: &str| fs::write(path, text).unwrap();
+        write(own.join("bokehcam.conf"), "# options\noptions v4l2loopback devices=1\n");
+        write(own.join("other.conf"), "options v4l2loopback-other a=1\noptions snd x=1\n#options v4l2loopback a=1\n");
+        write(vendor.join("notes.txt"), "options v4l2loopback devices=9\n");
+        assert!(check().is_none());
+        write(vendor.join("v4l2-relayd.conf"), "alias x y\noptions  v4l2loopback exclusive_caps=0\n");
+        let found = check().unwrap();
+        let [first, last] =
+            [own.join("bokehcam.conf"), vendor.join("v4l2-relayd.conf")].map(|path| path.display().to_string());
+        assert!(found.found.starts_with(&format!("{first} and {last} both set")), "{}", found.found);
+        // A file of the same name in an earlier folder takes its place.
+        write(own.join("v4l2-relayd.conf"), "# nothing\n");
+        assert!(check().is_none());
+    }
 
     #[test]
     fn a_list_of_modules_names_the_module_in_any_folder_and_compression() {

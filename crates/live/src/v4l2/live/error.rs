@@ -43,6 +43,13 @@ pub enum OpenError {
     /// A control cannot be set as requested.
     #[error("{}: {source}", path.display())]
     Control { path: PathBuf, source: ControlError },
+    /// It does not start to send, or its last program left it in a bad state.
+    #[error(
+        "{}: the camera does not start ({source}): unplug it and plug it in again, restart the computer if it is built in, \
+         or try another --format or --size",
+        path.display()
+    )]
+    NotStarting { path: PathBuf, source: io::Error },
     /// The queue of buffers cannot be set up.
     #[error("{}: the camera cannot be started: {source}", path.display())]
     Queue { path: PathBuf, source: QueueError },
@@ -57,6 +64,10 @@ const ENXIO: i32 = rustix::io::Errno::NXIO.raw_os_error();
 const EACCES: i32 = rustix::io::Errno::ACCESS.raw_os_error();
 const EBUSY: i32 = rustix::io::Errno::BUSY.raw_os_error();
 const ENODEV: i32 = rustix::io::Errno::NODEV.raw_os_error();
+const EIO: i32 = rustix::io::Errno::IO.raw_os_error();
+const EPIPE: i32 = rustix::io::Errno::PIPE.raw_os_error();
+const EPROTO: i32 = rustix::io::Errno::PROTO.raw_os_error();
+const ETIMEDOUT: i32 = rustix::io::Errno::TIMEDOUT.raw_os_error();
 const ENOSPC: i32 = rustix::io::Errno::NOSPC.raw_os_error();
 
 impl OpenError {
@@ -79,6 +90,11 @@ impl OpenError {
             QueueError::Refused { step: "STREAMON", source } if source.raw_os_error() == Some(ENOSPC) => {
                 Self::Bandwidth(path.to_owned())
             }
+            QueueError::Refused { step: "STREAMON", source }
+                if matches!(source.raw_os_error(), Some(EIO | EPIPE | EPROTO | ETIMEDOUT)) =>
+            {
+                Self::NotStarting { path: path.to_owned(), source }
+            }
             QueueError::Refused { step, source } => match Self::from_io(path, step, source) {
                 Self::Io { path, what, source } => {
                     Self::Queue { path, source: QueueError::Refused { step: what, source } }
@@ -91,7 +107,7 @@ impl OpenError {
 
     /// Whether a retry may help: another program may release the device, or a driver recover.
     pub fn is_transient(&self) -> bool {
-        matches!(self, Self::Busy { .. } | Self::Queue { .. } | Self::Io { .. })
+        matches!(self, Self::Busy { .. } | Self::NotStarting { .. } | Self::Queue { .. } | Self::Io { .. })
     }
 
     /// Whether the device is absent: it may come back.
@@ -132,6 +148,12 @@ mod tests {
         let path = Path::new("/dev/video7");
         let full = OpenError::from_queue(path, refused("STREAMON", ENOSPC)).to_string();
         assert!(full.contains("USB bandwidth") && full.contains("--format MJPG"), "{full}");
+        for errno in [EIO, EPIPE, EPROTO, ETIMEDOUT] {
+            let error = OpenError::from_queue(path, refused("STREAMON", errno));
+            let said = error.to_string();
+            assert!(said.starts_with("/dev/video7: the camera does not start (") && said.contains("plug it in again"));
+            assert!(error.is_transient(), "a busy camera bus recovers");
+        }
         assert!(OpenError::from_queue(path, refused("QBUF", ENOSPC)).to_string().contains("QBUF"));
         assert!(OpenError::from_queue(path, QueueError::TooFewBuffers { granted: 1 }).to_string().contains("1 of 4"));
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use v4l::v4l_sys as sys;
 
 use crate::v4l2::device::{Device, node_caps, zeroed};
-use crate::v4l2::node::{Node, decode_text, list_nodes};
+use crate::v4l2::node::{Node, decode_text, list_nodes, short_name};
 
 /// A camera, independent of its number.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,9 +39,9 @@ impl CameraIdentity {
         &self.node
     }
 
-    /// Its card name.
-    pub fn card(&self) -> &str {
-        &self.card
+    /// Its node and name.
+    pub fn describe(&self) -> String {
+        format!("{} ({})", self.node.display(), short_name(&self.card))
     }
 
     /// Searches for the camera: first via its links and last node; with `search_all`, also among all nodes, each of

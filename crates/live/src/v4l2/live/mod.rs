@@ -108,7 +108,7 @@ impl LiveDevice {
             }
         };
         let identity = CameraIdentity::new(&path, &session.capability);
-        let name = format!("{} ({})", path.display(), identity.card());
+        let name = identity.describe();
         let (negotiated, now_ns) = (session.negotiated, clock.now_ns());
         tracing::info!("{name}: {negotiated}");
         Ok(Self {

@@ -1,9 +1,10 @@
 //! Recovery of a device that fails, stalls or disappears.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::error::{self, OpenError};
+use super::negotiate::{ModeRequest, NoMode};
 use super::session::Session;
 use super::watchdog::Remedy;
 use super::{ERROR_PAUSE_NS, LiveDevice, RETRY_NS, SEARCH_PERIOD_NS, State};
@@ -61,7 +62,7 @@ impl LiveDevice {
     /// Tries once to open the device at its current node; if that fails, schedules a later attempt.
     pub(super) fn reopen(&mut self) {
         let opened = match self.find_node() {
-            Some(path) => Session::open(&path, &self.request, &self.settings, Some(&self.negotiated), &self.clock),
+            Some(path) => self.open_session(&path),
             None => Err(OpenError::Gone(self.identity.node().to_owned())),
         };
         let now_ns = self.clock.now_ns();
@@ -93,6 +94,21 @@ impl LiveDevice {
         }
     }
 
+    /// Opens the device again. One that came back without the requested format is taken with the nearest one, as waiting
+    /// would not bring it.
+    fn open_session(&self, path: &Path) -> Result<Session, OpenError> {
+        let open =
+            |request: &ModeRequest| Session::open(path, request, &self.settings, Some(&self.negotiated), &self.clock);
+        match open(&self.request) {
+            Err(OpenError::NoMode { source: NoMode::Format { wanted, .. }, .. }) => {
+                let session = open(&ModeRequest { fourcc: None, ..self.request })?;
+                tracing::warn!("{}: it came back without {wanted}", self.name);
+                Ok(session)
+            }
+            opened => opened,
+        }
+    }
+
     /// Finds the current node of the device; searches all nodes only every [`SEARCH_PERIOD_NS`].
     fn find_node(&mut self) -> Option<PathBuf> {
         let now_ns = self.clock.now_ns();
@@ -104,6 +120,7 @@ impl LiveDevice {
         let found = self.identity.find_node(search_all);
         if let Some(path) = found.as_ref().filter(|path| **path != before) {
             tracing::info!("{}: it is {} now", self.name, path.display());
+            self.name = self.identity.describe();
         }
         found
     }

@@ -61,6 +61,25 @@ fn names_that_are_no_text_do_not_stop_the_list() {
 }
 
 #[test]
+fn a_name_that_is_said_twice_is_said_once_and_both_find_the_camera() {
+    for (card, name) in [
+        ("UVC Test Webcam: UVC Test Webca", "UVC Test Webcam"),
+        ("Integrated Camera: Integrated C", "Integrated Camera"),
+        ("HD Webcam: HD Webcam", "HD Webcam"),
+        ("HD Webcam: Front", "HD Webcam: Front"),
+        ("Cam: HD Cam", "Cam: HD Cam"),
+        ("Brio", "Brio"),
+        ("", ""),
+    ] {
+        assert_eq!(short_name(card), name);
+        let nodes = [node(0, "uvcvideo", card, CAMERA)];
+        for wanted in [card, name].into_iter().filter(|wanted| !wanted.is_empty()) {
+            assert!(find_by_card(wanted, &nodes).is_ok(), "{wanted}");
+        }
+    }
+}
+
+#[test]
 fn a_part_of_the_cards_name_finds_the_camera_and_only_cameras() {
     let nodes = [
         node(0, "uvcvideo", "HD Webcam: Front", CAMERA),
