@@ -1,5 +1,5 @@
-//! Tests with real drivers: the kernel's test camera `vivid` and `v4l2loopback`, in the virtual machine of
-//! `tests/vm/run`.
+//! Tests with real drivers: the kernel's test camera `vivid`, `v4l2loopback`, and `uvcvideo` with an emulated USB webcam,
+//! in the virtual machine of `tests/vm/run`.
 //!
 //! `scripts/test` runs them if that machine can run. By hand:
 //! `CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER="$PWD/tests/vm/run --" cargo test --test camera -- --include-ignored`
@@ -18,4 +18,5 @@ mod plate;
 #[path = "../common/program.rs"]
 mod program;
 mod two_eyes;
+mod usb;
 mod virtual_camera;
