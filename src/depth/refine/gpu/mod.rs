@@ -198,7 +198,6 @@ impl Resources {
             rescale: last.map_or(1.0, |(_, before_m)| focus_m / before_m),
             max_hole_px: guided_fill::max_hole_px(color.width as usize) as u32,
             is_fresh: last.is_none().into(),
-            ..Frame::default()
         };
         device.upload(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
         device.upload(&self.buffers.rgb, 0, &color.rgb);
