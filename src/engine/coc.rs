@@ -194,10 +194,8 @@ impl CocCalculator {
     /// Drops all history, because another scene comes.
     pub fn clear_history(&mut self) {
         self.focus = Focus::new(focus_rule(self.rule));
-        match &mut self.postprocessor {
-            Postprocessor::Keep => {}
-            Postprocessor::Fill(filler) => **filler = HoleFiller::new(),
-            Postprocessor::Refine(refiner) => refiner.reset(),
+        if let Postprocessor::Refine(refiner) = &mut self.postprocessor {
+            refiner.reset();
         }
         self.background = self.background.take().map(|_| BackgroundMemory::default());
     }
