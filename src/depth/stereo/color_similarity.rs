@@ -1,7 +1,7 @@
 //! Fills occlusions at the border by colour similarity: a pixel with the colour of a surface that both cameras see
 //! belongs to that surface.
 //!
-//! The left border is filled along the picture ([`super::border`]), which misses objects that stand in front of it and
+//! The left border is filled along the picture ([`super::mismatches`]), which misses objects that stand in front of it and
 //! touch nothing that the right camera sees: leaves before a wall become wall. If nearly all known pixels of a colour
 //! lie on one surface, border pixels of that colour do, too, and take its disparity where theirs differs.
 

@@ -4,7 +4,6 @@
 //! fills the gaps between them, in integers, so that all executors agree to the bit ([`fixed`]); the post-processing is
 //! common to all (`postprocess`).
 
-mod border;
 pub mod check;
 mod color_similarity;
 #[doc(hidden)]
@@ -18,6 +17,7 @@ mod gaps;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod half;
+mod mismatches;
 mod penalty;
 mod postprocess;
 mod rectify;

@@ -1,21 +1,21 @@
-//! Post-processing of an executor's result: fills the left border and empty rows, corrects foreground fattening, and
-//! removes the remaining outliers with a 3x3 median.
+//! Post-processing of an executor's result: fills mismatches, the left border and empty rows, corrects foreground
+//! fattening, and removes the remaining outliers with a 3x3 median.
 
 use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
-use super::border::BorderFiller;
 use super::color_similarity::{ColorSimilarity, Colors};
 use super::fattening::FatteningCorrection;
 use super::fixed::{FILLED, ONE};
 use super::gaps;
+use super::mismatches::MismatchFiller;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Post-processes maps of one size; owns its buffers.
 pub struct PostProcessor {
     width: usize,
-    border: BorderFiller,
+    mismatches: MismatchFiller,
     similarity: ColorSimilarity,
     fattening: FatteningCorrection,
     /// The median of the filled map.
@@ -30,7 +30,7 @@ impl PostProcessor {
     pub fn new((width, height): (usize, usize)) -> Self {
         Self {
             width,
-            border: BorderFiller::new((width, height)),
+            mismatches: MismatchFiller::new((width, height)),
             similarity: ColorSimilarity::default(),
             fattening: FatteningCorrection::new((width, height)),
             smooth: vec![0; width * height],
@@ -49,14 +49,14 @@ impl PostProcessor {
         workers: &mut ThreadPool,
         px: &mut [f32],
     ) {
-        let Self { width, border, similarity, fattening, smooth, taken, arch } = self;
+        let Self { width, mismatches, similarity, fattening, smooth, taken, arch } = self;
         let (width, arch) = (*width, *arch);
-        border.fill(map, luma, width);
+        mismatches.fill(map, luma);
         if let Some(colors) = colors {
-            similarity.correct(map, width, border.first_known_columns(), colors);
+            similarity.correct(map, width, mismatches.first_known_columns(), colors);
         }
         // Paths with too large changes of brightness have reached no pixel.
-        for (row, &first) in map.chunks_exact_mut(width).zip(border.first_known_columns()) {
+        for (row, &first) in map.chunks_exact_mut(width).zip(mismatches.first_known_columns()) {
             gaps::fill_row(&mut row[..=first], 0);
         }
         gaps::fill_empty_rows(map, width);
