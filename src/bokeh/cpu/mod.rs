@@ -120,6 +120,13 @@ impl CpuBokeh {
         }
     }
 
+    /// Uses these vector instructions instead of the best available ones, for tests.
+    #[doc(hidden)]
+    pub fn with_arch(mut self, arch: Arch) -> Self {
+        self.arch = arch;
+        self
+    }
+
     /// Changes the quality of the next frames, if the plan has other levels.
     pub fn set_quality(&mut self, quality: Quality) {
         self.plan.set_quality(quality);

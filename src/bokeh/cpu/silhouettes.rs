@@ -149,20 +149,32 @@ impl Proximity {
     /// Whether any of some pixels from column `x` of the chunk on may be inside.
     #[inline(always)]
     pub fn any_inside(&self, x: usize, count: usize) -> bool {
-        self.0[0][x / SILHOUETTE_CELL..][..count / SILHOUETTE_CELL + 2].iter().any(|&square| square > 0.0)
+        self.0[0][x / SILHOUETTE_CELL..][..count.div_ceil(SILHOUETTE_CELL) + 2].iter().any(|&square| square > 0.0)
     }
 
-    /// Returns the values of some pixels from column `x` of the chunk on, linear between the centres of cells.
+    /// Returns the values of some pixels from column `x` of the chunk on, a multiple of their `count`, linear between the
+    /// centres of cells.
     #[inline(always)]
     pub fn interpolate(&self, x: usize, count: usize) -> [[f32; MAX_LANES]; 2] {
         let mut pixels = [[0.0; MAX_LANES]; 2];
+        let between = |[before, here, after]: [f32; 3], i: usize| {
+            let offset = (i as f32 + 0.5) / SILHOUETTE_CELL as f32 - 0.5;
+            here + (if offset < 0.0 { before } else { after } - here) * offset.abs()
+        };
         for (pixels, line) in pixels.iter_mut().zip(&self.0) {
             let line = &line[x / SILHOUETTE_CELL..];
+            let cells = |k: usize| [line[k], line[k + 1], line[k + 2]];
+            // A vector that is narrower than a cell begins inside it.
+            if count < SILHOUETTE_CELL {
+                for (i, value) in pixels[..count].iter_mut().enumerate() {
+                    *value = between(cells(0), x % SILHOUETTE_CELL + i);
+                }
+                continue;
+            }
             for (k, group) in pixels[..count].as_chunks_mut::<SILHOUETTE_CELL>().0.iter_mut().enumerate() {
-                let (before, here, after) = (line[k], line[k + 1], line[k + 2]);
+                let cells = cells(k);
                 for (i, value) in group.iter_mut().enumerate() {
-                    let offset = (i as f32 + 0.5) / SILHOUETTE_CELL as f32 - 0.5;
-                    *value = here + (if offset < 0.0 { before } else { after } - here) * offset.abs();
+                    *value = between(cells, i);
                 }
             }
         }

@@ -175,8 +175,8 @@ fn scale_surface<S: Simd, const W: usize>(
     values
 }
 
-/// Applies the tent horizontally to a plane: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall
-/// fit in one vector each, and the remaining sums are over runs of `S` values.
+/// Applies the tent horizontally to a plane: a row of sums at the bin's scale. Where the tent rises for one pixel of the bin it
+/// falls for the one before, so the remaining sums are over runs of `S` values.
 #[inline(always)]
 pub fn downscale_row<V: Simd, const S: usize>(
     simd: V,
@@ -184,26 +184,23 @@ pub fn downscale_row<V: Simd, const S: usize>(
     columns: usize,
     mean: &mut [f32; PLANE_LEN],
 ) {
-    // Rising half of the tent, repeated; the falling half follows from it.
-    let ramp: [f32; BLOCK] = const {
-        let mut ramp = [0.0; BLOCK];
+    // The rising and the falling half of the tent, repeated.
+    let [rise, fall] = const {
+        let mut halves = [[0.0; BLOCK]; 2];
         let mut k = 0;
         while k < BLOCK {
-            ramp[k] = ((k % S) as f32 + 0.5) / (S * S) as f32;
+            halves[0][k] = ((k % S) as f32 + 0.5) / (S * S) as f32;
+            halves[1][k] = 1.0 / S as f32 - halves[0][k];
             k += 1;
         }
-        ramp
+        halves
     };
-    let (rise, fall) = (load::<V>(&ramp, 0), {
-        let mut fall = [0.0; BLOCK];
-        for k in 0..V::F32_LANES {
-            fall[k] = 1.0 / S as f32 - ramp[k];
-        }
-        load::<V>(&fall, 0)
-    });
+    // The weights repeat every `S` columns, so that one vector has all of them if it is not narrower.
+    let phase = |x: usize| if V::F32_LANES >= S { 0 } else { x };
     let mut weighed = CacheAligned([0.0f32; BLOCK]);
     let start = MARGIN - S / 2;
     for x in (0..columns).step_by(V::F32_LANES) {
+        let (rise, fall) = (load::<V>(&rise, phase(x)), load::<V>(&fall, phase(x)));
         let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
         store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
     }
@@ -213,5 +210,45 @@ pub fn downscale_row<V: Simd, const S: usize>(
             total += value;
         }
         *mean = total;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::{Arch, WithSimd};
+
+    use super::*;
+
+    /// Averages a row at this scale.
+    struct Downscale<const S: usize>(f32);
+
+    impl<const S: usize> WithSimd for Downscale<S> {
+        type Output = Vec<f32>;
+        fn with_simd<V: Simd>(self, simd: V) -> Vec<f32> {
+            let row = std::array::from_fn(|x| if x == MARGIN + 2 * S { 1.0 } else { self.0 });
+            let mut mean = [0.0; PLANE_LEN];
+            downscale_row::<V, S>(simd, &row, BLOCK, &mut mean);
+            mean[..BLOCK / S].to_vec()
+        }
+    }
+
+    fn check<const S: usize>() {
+        for arch in [Arch::new(), Arch::Scalar] {
+            let constant = arch.dispatch(Downscale::<S>(1.0));
+            assert!(constant.iter().all(|mean| (mean - 1.0).abs() < 1e-6), "{S}: {constant:?}");
+            // A point in the first column of pixel 2 of the bin: the tents of its pixels 1 and 2 meet there.
+            let (rising, falling) = ((S as f32 + 1.0) / 2.0, (S as f32 - 1.0) / 2.0);
+            let point = arch.dispatch(Downscale::<S>(0.0));
+            let mut expected = vec![0.0; BLOCK / S];
+            (expected[2], expected[1]) = (rising / (S * S) as f32, falling / (S * S) as f32);
+            assert!(point.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{S}: {point:?}");
+        }
+    }
+
+    #[test]
+    fn vectors_of_any_width_average_by_the_tent() {
+        check::<2>();
+        check::<4>();
+        check::<8>();
     }
 }
