@@ -148,6 +148,15 @@ fn a_busy_camera_names_who_has_it() {
     run("stream 0 --to null --frames 1").refused(1, &[&name]);
     let list = run("devices --json 0").json();
     assert_eq!(list["cameras"][0]["holders"][0]["pid"], other.0.id());
+    assert_eq!(list["cameras"][0]["holders"][0]["has_buffers"], true);
+    let said = run("doctor").printed();
+    assert!(said.contains(&format!("{name} takes pictures")), "{said}");
+    drop(other);
+    let open = fs::File::open(CAMERA).unwrap();
+    let said = run("doctor").printed();
+    let watching = format!("(process {}) has it open and takes no pictures", std::process::id());
+    assert!(said.contains(&watching) && !said.contains("takes pictures"), "{said}");
+    drop(open);
 }
 
 #[test]

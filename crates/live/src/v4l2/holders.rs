@@ -11,6 +11,9 @@ pub struct Holder {
     pub pid: u32,
     /// Process name, truncated by the system to 15 bytes.
     pub name: String,
+    /// Whether it has buffers of the device in its memory: it takes pictures, or is about to. Programs that watch for
+    /// cameras only open them.
+    pub has_buffers: bool,
 }
 
 impl Holder {
@@ -32,7 +35,12 @@ pub fn list_holders(path: &Path) -> Vec<Holder> {
     let Ok(device) = fs::metadata(path).map(|node| node.rdev()) else { return Vec::new() };
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
-    pids.filter(|pid| has_device_open(*pid, device)).map(|pid| Holder { pid, name: process_name(pid) }).collect()
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let describe = |pid| {
+        let maps = fs::read_to_string(format!("/proc/{pid}/maps")).unwrap_or_default();
+        Holder { pid, name: process_name(pid), has_buffers: maps_file(&maps, &real) }
+    };
+    pids.filter(|pid| has_device_open(*pid, device)).map(describe).collect()
 }
 
 /// Lists the holders except this program.
@@ -50,6 +58,12 @@ fn has_device_open(pid: u32, device: u64) -> bool {
     })
 }
 
+/// Whether the memory of a process, as `/proc/PID/maps` lists it, contains parts of a file.
+fn maps_file(maps: &str, file: &Path) -> bool {
+    // Address, rights, offset, device, inode, path.
+    maps.lines().filter_map(|line| line.split_whitespace().nth(5)).any(|mapped| Path::new(mapped) == file)
+}
+
 fn process_name(pid: u32) -> String {
     fs::read_to_string(format!("/proc/{pid}/comm")).map_or_else(|_| "?".into(), |name| name.trim_end().to_owned())
 }
@@ -65,5 +79,12 @@ mod tests {
         assert!(own.is_some_and(|own| !own.name.is_empty()));
         drop(open);
         assert_eq!(list_holders(Path::new("/dev/no-such-node")), []);
+    }
+
+    #[test]
+    fn buffers_are_mapped_parts_of_the_device() {
+        let maps = "7f0a-7f0b rw-p 00000000 00:00 0 \n7f1a-7f1b rw-s 00097000 00:05 342        /dev/video0\n";
+        let of = |path: &str| maps_file(maps, path.as_ref());
+        assert_eq!([of("/dev/video0"), of("/dev/video"), of("0")], [true, false, false]);
     }
 }

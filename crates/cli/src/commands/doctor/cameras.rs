@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use super::system::System;
 use bokehcam_live::v4l2::controls::{self, LOW_LIGHT_CONTROL, Value};
-use bokehcam_live::v4l2::holders::list_holders;
+use bokehcam_live::v4l2::holders::{Holder, list_holders};
 use bokehcam_live::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, list_modes};
 use bokehcam_live::v4l2::node::{Kind, Node};
 use bokehcam_live::v4l2::{Device, controls::Control};
@@ -17,6 +17,12 @@ const USB2_MBIT_PER_S: f32 = 480.0;
 /// Drivers of raw sensors, which only libcamera can turn into pictures.
 const RAW_DRIVERS: [&str; 4] = ["isys", "intel-ipu6-isys", "intel-ipu7-isys", "ipu3-cio2"];
 
+/// What is known of libcamera 0.7 on such machines: its software processing ends with an assertion at some widths that are
+/// not the sensor's own, and takes the session manager along.
+const RAW_ADVICE: &str = "read it through PipeWire: `bokehcam devices` lists it once libcamera's part for PipeWire is \
+                          installed, for one program at a time; if it fails at --size 640x480, 1280x720 or 1920x1080, \
+                          give one of the sizes listed there, or connect a USB camera";
+
 /// Checks the cameras, and the nodes that could be cameras.
 pub fn check_cameras(nodes: &[Node], system: &System) -> Vec<Finding> {
     let (raw, cameras): (Vec<&Node>, Vec<&Node>) = nodes
@@ -29,7 +35,7 @@ pub fn check_cameras(nodes: &[Node], system: &System) -> Vec<Finding> {
     }
     if let Some(node) = raw.first() {
         let found = format!("{} nodes such as {node} give raw sensor data, which only libcamera can use", raw.len());
-        findings.push(Finding::note(TOPIC, found, "connect a USB camera"));
+        findings.push(Finding::note(TOPIC, found, RAW_ADVICE));
     }
     if cameras.is_empty() {
         findings.push(report_none(system));
@@ -76,13 +82,22 @@ fn check_camera(node: &Node) -> Vec<Finding> {
             Finding::good(TOPIC, format!("{node}: USB at {mbit_per_s} Mbit/s"))
         });
     }
-    if !holders.is_empty() {
-        let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
-        let found = format!("{node}: opened by {}", names.join(", "));
-        findings.push(Finding::note(TOPIC, found, "only one program can take pictures: end the others if it is busy"));
-    }
+    findings.extend(check_holders(node, holders));
     findings.extend(check_low_light(node, &controls::list_controls(&device).unwrap_or_default()));
     findings
+}
+
+/// Reports the programs that take pictures, and those that only have the camera open, as session managers do.
+fn check_holders(node: &Node, holders: Vec<Holder>) -> Vec<Finding> {
+    let (taking, watching): (Vec<Holder>, Vec<Holder>) = holders.into_iter().partition(|holder| holder.has_buffers);
+    let join = |holders: &[Holder]| holders.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let taken = (!taking.is_empty()).then(|| {
+        let found = format!("{node}: {} takes pictures", join(&taking));
+        Finding::note(TOPIC, found, "only one program can do so: end it, or read its camera through PipeWire")
+    });
+    let open = (!watching.is_empty())
+        .then(|| Finding::good(TOPIC, format!("{node}: {} has it open and takes no pictures", join(&watching))));
+    taken.into_iter().chain(open).collect()
 }
 
 /// Notes that the camera is set to lower its frame rate in the dark for a longer exposure.

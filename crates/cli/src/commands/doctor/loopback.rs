@@ -139,11 +139,12 @@ fn check_options(folders: &[&Path]) -> Option<Finding> {
     let (last, others) = setting.split_last().filter(|(_, others)| !others.is_empty())?;
     let others: Vec<String> = others.iter().map(|path| path.display().to_string()).collect();
     let found = format!(
-        "{} and {} both set options of v4l2loopback: where they differ, the latter wins",
+        "{} and {} set options of v4l2loopback: where they differ, the latter wins",
         others.join(", "),
         last.display()
     );
-    Some(Finding::note(TOPIC, found, "keep one of them, and load the module again: `sudo modprobe -r v4l2loopback`"))
+    let fix = format!("keep one of them, then `sudo modprobe -r v4l2loopback` and `{}`", load_command());
+    Some(Finding::note(TOPIC, found, fix))
 }
 
 #[cfg(test)]
@@ -168,7 +169,7 @@ mod tests {
         let found = check().unwrap();
         let [first, last] =
             [own.join("bokehcam.conf"), vendor.join("v4l2-relayd.conf")].map(|path| path.display().to_string());
-        assert!(found.found.starts_with(&format!("{first} and {last} both set")), "{}", found.found);
+        assert!(found.found.starts_with(&format!("{first} and {last} set")), "{}", found.found);
         // A file of the same name in an earlier folder takes its place.
         write(own.join("v4l2-relayd.conf"), "# nothing\n");
         assert!(check().is_none());

@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_holder_is_named() {
-        let holder = |pid| Holder { pid, name: "zoom".into() };
+        let holder = |pid| Holder { pid, name: "zoom".into(), has_buffers: true };
         assert_eq!(format_holders(&[holder(1)]), ": zoom (process 1) has it open; close that first");
         assert_eq!(format_holders(&[holder(std::process::id()), holder(1)]), format_holders(&[holder(1)]));
         assert!(format_holders(&[holder(std::process::id())]).contains("another user"));

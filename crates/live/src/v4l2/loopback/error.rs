@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn whoever_holds_a_node_is_named() {
-        let by = vec![Holder { pid: 7, name: "obs".into() }, Holder { pid: 8, name: "mpv".into() }];
+        let by =
+            [(7, "obs"), (8, "mpv")].map(|(pid, name)| Holder { pid, name: name.into(), has_buffers: true }).into();
         let taken = LoopbackError::InUse { path: "/dev/video9".into(), by };
         assert_eq!(
             taken.to_string(),
