@@ -16,6 +16,8 @@ mod private;
 mod report;
 mod settings;
 mod system;
+#[cfg(feature = "camera")]
+mod trial_run;
 
 use std::path::PathBuf;
 
@@ -39,8 +41,8 @@ pub struct DoctorCommand {
     /// As JSON
     #[arg(long)]
     json: bool,
-    /// Print a report of this machine to share, and write it to FILE; without names of users and machines, serial
-    /// numbers and pictures
+    /// Print a report of this machine to share, and write it to FILE, after a run of ten seconds; without names of users
+    /// and machines, serial numbers and pictures
     #[arg(long, value_name = "FILE", num_args = 0..=1, conflicts_with = "json")]
     report: Option<Option<PathBuf>>,
 }

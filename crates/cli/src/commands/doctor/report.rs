@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::findings::CheckResults;
 use super::private::Redactor;
-use super::{CliError, hardware};
+use super::{CliError, hardware, trial_run};
 use crate::commands::{bench, devices};
 use crate::files::{create_parent_folder, refuse_overwrite, write_atomically};
 use crate::terminal::{print_to_stderr, print_to_stdout};
@@ -13,7 +13,7 @@ use crate::terminal::{print_to_stderr, print_to_stdout};
 /// Introduction, and a question for the user to answer.
 const FORM: &str = "\
 <!-- Made by `bokehcam doctor --report`. Names of users, their folders, the name of this machine and serial numbers are taken
-out; no picture was taken, nothing was sent. Read it all before you give it to others. -->
+out; no picture was kept, nothing was sent. Read it all before you give it to others. -->
 
 ### What works, and what does not
 
@@ -37,6 +37,8 @@ pub fn run(file: Option<&Path>, config: Option<&Path>) -> Result<(), CliError> {
     add_section(&mut facts, "Cameras", &devices::list::format_devices(&examined.nodes));
     add_section(&mut facts, "What doctor found", &examined.format_text());
     add_section(&mut facts, "Time of the blur", &bench::run_short_benchmark());
+    print_to_stderr("measuring for ten seconds; the pictures are dropped");
+    add_section(&mut facts, "A run of ten seconds", &trial_run::run(&examined.nodes, config));
     let report = FORM.to_owned() + &Redactor::detect().redact(&facts);
     print_to_stdout(report.as_bytes())?;
     match file {
