@@ -123,8 +123,9 @@ pub fn run(mut run: Run) -> Result<Report, PipelineError> {
     });
 
     // A source with a known number of frames was stopped before its end.
-    let is_cut =
-        stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| counter.frame_counts().captured < frames);
+    let counts = counter.frame_counts();
+    let done = if info.live { counts.delivered } else { counts.captured };
+    let is_cut = stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| done < frames);
     let ending = if ended.is_err() || is_cut { Ending::Truncated } else { Ending::Complete };
     let sink = destination.sink();
     let (outputs, nodes) = (sink.output_counters(), sink.node_counters());

@@ -152,7 +152,12 @@ fn record_frames(
         }
         let has_depth = source.is_some() || info.frame_data == FrameData::Depth;
         writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
-        progress.set_delivered(writer.frames() as u64);
+        let recorded = writer.frames() as u64;
+        progress.set_delivered(recorded);
+        // A live source does not end by itself.
+        if info.live && info.frames.is_some_and(|frames| recorded >= frames) {
+            break;
+        }
     }
     // A camera is endless: stopping it is its regular end.
     Ok(!stop.load(Ordering::Relaxed) || info.live || info.frames.is_none())

@@ -1,10 +1,11 @@
 //! The kernel's driver of USB webcams (`uvcvideo`) with an emulated one (`tests/vm/webcam`): its name and formats,
-//! damaged pictures, and a camera that is unplugged and comes back.
+//! damaged pictures, dim light, and a camera that is unplugged and comes back.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
+use std::time::{Duration, Instant};
 
 use bokehcam_live::capture::v4l2::V4l2Camera;
 use rustix::process::{Pid, Signal, kill_process};
@@ -136,4 +137,48 @@ fn a_webcam_that_comes_back_without_the_format_is_taken_as_it_is() {
     // Scaled to the size that the frames had before.
     read(&mut camera, 5, SIZE);
     webcam.line_with("stream MJPEG 640x480");
+}
+
+/// The moments are spread over a picture's transfer, the pause before the next one, and the search for the camera.
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_webcam_that_is_unplugged_at_any_moment_comes_back() {
+    let mut webcam = Webcam::plug(&[]);
+    let mut camera = webcam.open("MJPG");
+    for round in 0_u64..30 {
+        let began = Instant::now();
+        let played = Duration::from_millis(round * 37 % 200);
+        while began.elapsed() < played {
+            super::machine::frame_now(&mut camera);
+        }
+        webcam.say("unplug");
+        std::thread::sleep(Duration::from_millis(round * 61 % 300));
+        webcam.say("plug");
+        webcam.line_with("is /dev/video");
+        read(&mut camera, 2, SIZE);
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn as_many_frames_of_a_webcam_as_were_asked_for_are_in_the_file_however_many_are_damaged() {
+    let webcam = Webcam::plug(&["--cut", "3"]);
+    let asked = format!("stream {} --size 320x240 --format MJPG --frames 20 --to /tmp/asked.y4m --force", webcam.node);
+    let said = run(&asked).done().to_owned();
+    let (delivered, taken) = said.split_once("20 of ").expect(&said);
+    assert!(!delivered.ends_with(|c: char| c.is_ascii_digit()), "{said}");
+    let taken: u64 = taken.split(' ').next().unwrap().parse().unwrap();
+    assert!(taken > 20 && said.contains(" damaged"), "{said}");
+    let frames = std::fs::read("/tmp/asked.y4m").unwrap().windows(6).filter(|bytes| bytes == b"FRAME\n").count();
+    assert_eq!(frames, 20);
+}
+
+/// Most webcams expose longer in dim light, and keep promising the rate that was agreed on.
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_webcam_that_gives_half_its_rate_is_named_as_the_cause() {
+    let webcam = Webcam::plug(&["--drop", "2"]);
+    let dim = format!("stream {} --size 320x240 --format MJPG --frames 45 --effect none --to null", webcam.node);
+    let said = run(&dim).done().to_owned();
+    assert!(said.contains("frames a second instead of 15"), "{said}");
 }

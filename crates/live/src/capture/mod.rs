@@ -134,7 +134,8 @@ pub struct SourceInfo {
     pub size: (u32, u32),
     /// Time between frames, > 0.
     pub period_ns: u64,
-    /// Number of frames until the end, if known: for a progress bar.
+    /// Number of frames until the end, if known: for a progress bar. A live source does not end by itself: its run ends
+    /// once as many were delivered, lost ones not included.
     pub frames: Option<u64>,
     /// Whether frames arrive at their own pace. Otherwise they can be read and skipped at will, and a real-time run
     /// waits for their media time.

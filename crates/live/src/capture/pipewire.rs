@@ -46,9 +46,9 @@ struct Picture {
 }
 
 impl PipeWireCamera {
-    /// Opens the camera that `name` refers to, in the mode closest to `request`, and starts it. It ends after `frames`
-    /// frames, lost ones not included; never with `None`. With `filters`, its pictures go to the clients that requested
-    /// this camera, and arrive while there are any.
+    /// Opens the camera that `name` refers to, in the mode closest to `request`, and starts it. It does not end by
+    /// itself; `frames` are to be delivered ([`SourceInfo::frames`]). With `filters`, its pictures go to the clients that
+    /// requested this camera, and arrive while there are any.
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
@@ -79,9 +79,6 @@ impl Camera for PipeWireCamera {
     }
 
     fn next(&mut self, buffers: FrameBuffers) -> Result<Captured, CaptureError> {
-        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
-            return Ok(Captured::End);
-        }
         if self.pending.is_none() {
             self.reader.set_wanted(true);
             let began_ns = self.clock.now_ns();
@@ -275,6 +272,35 @@ pub fn format_modes(mode: &Mode) -> FormatModes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// libcamera's processing on GPUs pads rows to 2048 bytes.
+    #[test]
+    fn padded_rows_are_read_as_rows_without_padding() {
+        const SIZE: (usize, usize) = (6, 4);
+        const PADDED: usize = 2048;
+        // A luma plane and one of chroma pairs with half the rows, each with `stride` bytes per row.
+        let rows = |rows: usize, stride: usize, first: usize| -> Vec<u8> {
+            let byte = |x: usize, y: usize| if x < SIZE.0 { (first + 31 * y + 7 * x) as u8 } else { 0xee };
+            (0..rows).flat_map(|y| (0..stride).map(move |x| byte(x, y))).collect()
+        };
+        let picture = |stride: usize, in_two_planes: bool| {
+            let planes = [rows(SIZE.1, stride, 20), rows(SIZE.1 / 2, stride, 90)];
+            let whole = planes.concat();
+            let planes: &[&[u8]] = if in_two_planes { &[&planes[0], &planes[1]] } else { &[&whole] };
+            let (sender, mut receiver) = link::live();
+            let any = ModeRequest::for_content(bokehcam_media::layout::Content::Color);
+            let mut decoder = PictureDecoder::new(any, sender);
+            decoder.set_format(&NegotiatedFormat { fourcc: *b"NV12", size: (6, 4), rate: (30, 1) });
+            decoder.decode(&Frame { planes, stride_bytes: stride, captured_ns: 0 }).unwrap();
+            let Received::Item(picture) = receiver.recv_timeout(MAX_WAIT) else { panic!("there is a picture") };
+            picture.color.rgb.clone()
+        };
+        let plain = picture(SIZE.0, false);
+        assert!(plain.iter().any(|&code| code != plain[0]));
+        for (stride, in_two_planes) in [(SIZE.0, true), (PADDED, false), (PADDED, true)] {
+            assert_eq!(picture(stride, in_two_planes), plain, "{stride} bytes per row, in two planes: {in_two_planes}");
+        }
+    }
 
     #[test]
     fn modes_are_ranked_as_those_of_other_cameras() {

@@ -34,7 +34,7 @@ pub struct V4l2Camera {
 
 impl V4l2Camera {
     /// Opens the camera that `name` refers to, in the mode closest to `request`, with its controls set to `settings`,
-    /// and starts it. It ends after `frames` frames, lost ones not included; never with `None`.
+    /// and starts it. It does not end by itself; `frames` are to be delivered ([`SourceInfo::frames`]).
     ///
     /// # Errors
     /// The camera does not exist, or cannot be used.
@@ -78,9 +78,6 @@ impl V4l2Camera {
     pub fn next_within(&mut self, timeout: Duration, color: &mut ColorImage) -> Captured {
         if let Some(lost) = self.next_loss() {
             return lost;
-        }
-        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
-            return Captured::End;
         }
         let began_ns = self.clock.now_ns();
         let next = self.live.next(timeout);

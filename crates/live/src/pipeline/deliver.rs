@@ -59,7 +59,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Delivers frames until they end, the sink is closed, or the viewer is gone.
+    /// Delivers frames until they end, as many as asked of a live source were, the sink is closed, or the viewer is gone.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> StageResult {
         let Shared { clock, counter, .. } = self.shared;
         let mut last_ns = None;
@@ -113,6 +113,9 @@ impl<'a> Stage<'a> {
                 return Ok(());
             }
             self.report_progress(quality);
+            if self.is_complete() {
+                break;
+            }
         }
         // The viewer still takes the last frame.
         self.count_viewed(true, at_viewer);
@@ -153,6 +156,12 @@ impl<'a> Stage<'a> {
         // A displaced frame is the previous one, which the viewer did not take.
         self.count_viewed(displaced.is_none(), std::mem::replace(at_viewer, open));
         Ok(())
+    }
+
+    /// Whether a live source, which does not end by itself, has delivered as many frames as were asked of it.
+    fn is_complete(&self) -> bool {
+        let Shared { counter, info, .. } = self.shared;
+        info.live && info.frames.is_some_and(|frames| counter.frame_counts().delivered >= frames)
     }
 
     /// Reports the progress of the run; `quality` is that of the last frame.

@@ -42,7 +42,7 @@ pub struct Frames {
     #[arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub repeat: bool,
-    /// Stop after this many frames
+    /// Stop after this many frames; of a camera, after as many were delivered
     #[arg(long, value_name = "N", value_parser = parse_count::<u64>)]
     pub frames: Option<u64>,
     /// Picture size; for a camera, its nearest size; for single scenes of several sizes (KITTI), which of them [default:

@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use bokehcam_live::capture::{Camera, SourceInfo};
+use bokehcam_live::capture::{Camera, Captured, SourceInfo};
 use bokehcam_live::pipeline::{Fault, Pace, run};
 use bokehcam_live::sink::{Ending, Null};
+use bokehcam_live::stats::DropCause;
 
 use crate::fakes::*;
 use crate::setup::*;
@@ -73,6 +74,32 @@ fn a_live_link_evicts_behind_a_sink_that_stands_still() {
     assert!(report.frames.is_balanced());
     assert!(report.frames.dropped.evicted > 180, "{:?}", report.frames);
     assert_eq!(report.frames.dropped.driver, 0, "a live camera is not asked to skip");
+}
+
+/// A live camera never ends by itself; of its frames, one in three is damaged, and the sink is slower than it is.
+#[test]
+fn as_many_frames_of_a_live_camera_as_were_asked_for_are_delivered() {
+    const ASKED: u64 = 20;
+    let mut fake = fake_camera(usize::MAX);
+    let info = SourceInfo { live: true, frames: Some(ASKED), period_ns: 1_000_000, ..fake.info() };
+    let camera = camera_by(info, move |before, shot| {
+        std::thread::sleep(Duration::from_millis(1));
+        match before % 3 {
+            2 => Captured::Lost(1, DropCause::Corrupt),
+            _ => fake.next(shot).unwrap(),
+        }
+    });
+    let shown = Arc::new(AtomicUsize::new(0));
+    let counts = Arc::clone(&shown);
+    let sink = sink_by(move |_| {
+        counts.fetch_add(1, Ordering::SeqCst);
+        std::thread::sleep(Duration::from_millis(5));
+    });
+    let stop = AtomicBool::new(false);
+    let frames = run(simple(camera, sink, &stop, Pace::Realtime)).unwrap().frames;
+    assert!(frames.is_balanced(), "{frames:?}");
+    assert_eq!((frames.delivered, shown.load(Ordering::SeqCst) as u64), (ASKED, ASKED));
+    assert!(frames.dropped.corrupt > 0 && frames.captured > ASKED, "{frames:?}");
 }
 
 #[test]

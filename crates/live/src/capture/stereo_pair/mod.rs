@@ -49,7 +49,7 @@ const FIRST_PAIRS: u64 = 30;
 const MAX_POLLS: usize = 8;
 
 impl<E: PairedCamera> StereoPair<E> {
-    /// Pairs the frames of `left` and `right`; `frames` limits the number of pairs, `None` means no limit.
+    /// Pairs the frames of `left` and `right`; `frames` are to be delivered ([`SourceInfo::frames`]).
     ///
     /// # Errors
     /// Their pictures differ in size.
@@ -145,9 +145,6 @@ impl<E: PairedCamera> Camera for StereoPair<E> {
     }
 
     fn next(&mut self, FrameBuffers { color, right, .. }: FrameBuffers) -> Result<Captured, CaptureError> {
-        if self.info.frames.is_some_and(|frames| self.delivered >= frames) {
-            return Ok(Captured::End);
-        }
         let began_ns = self.clock.now_ns();
         let captured = self.left.next_within(MAX_WAIT, color);
         self.waited_ns = self.clock.now_ns() - began_ns;
