@@ -139,7 +139,7 @@ impl Follower {
         let command = command.split(['>', '|']).next().unwrap_or_default().trim_end();
         let mut words: Vec<&str> = command.split(' ').collect();
         if let [_, "stream" | "preview" | "plate" | "record", source, ..] = &mut words[..] {
-            let elsewhere = ["/dev/", "pipewire:", "C920", "somewhere/"];
+            let elsewhere = ["/dev/", "pipewire:", "C920", "OBS", "somewhere/"];
             let is_number = source.starts_with(|first: char| first.is_ascii_digit());
             if is_number || elsewhere.iter().any(|begin| source.starts_with(begin)) {
                 *source = "demo";
