@@ -310,8 +310,9 @@ impl CocCalculator {
             background.reveal_background(workers, map, color, lens);
         }
         hidden.add_to_matte(workers, map, color, lens, Hiding::NEAR);
-        // A stream has its memory for what the subject hides, and no time; a map that is complete was blurred in one before.
-        if *single && !matches!(postprocessor, Postprocessor::Keep) {
+        // A stream has its memory for what the subject hides, and no time; a map that is complete was blurred in one before;
+        // and a mask has one distance for all that is behind.
+        if *single && map.subject_m.is_none() && !matches!(postprocessor, Postprocessor::Keep) {
             hidden.add_to_matte(workers, map, color, lens, Hiding::SUBJECT);
         }
     }
