@@ -63,6 +63,8 @@ pub fn instruction_set(arch: Arch) -> &'static str {
 #[allow(unsafe_code)]
 #[inline(always)]
 pub fn prefetch<T>(values: &[T]) {
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = values;
     #[cfg(target_arch = "x86_64")]
     for at in (0..values.len()).step_by(CACHE_LINE_BYTES / size_of::<T>()) {
         use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};

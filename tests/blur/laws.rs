@@ -14,7 +14,6 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 use common::{COC_KINDS, coc, codes_apart, color, depth, noise, settings, shapes, three_depths};
-use pulp::Arch;
 
 fn blur(settings: &Settings, color: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage {
     let mut out = ColorImage::default();
@@ -256,27 +255,6 @@ fn the_number_of_threads_changes_nothing() {
     let one = of(1);
     assert_eq!(one, of(2));
     assert_eq!(one, of(5));
-}
-
-/// Processors differ in the width of their vectors, and in whether they round between a product and a sum.
-#[test]
-fn the_width_of_vectors_changes_nothing_but_the_rounding() {
-    let (width, height) = (150, 110);
-    let (image, mut map) = (noise(width, height), three_depths(width, height));
-    let field = coc(CocKind::Depth, height);
-    let CocField::Depth(lens) = field else { unreachable!("it is of a lens") };
-    Matting::default().find_mixed_pixels(&mut map, &image, lens.inverse_depth_step(matting::MIN_STEP_PX));
-    for (quality, privacy) in Quality::ALL.into_iter().flat_map(|quality| [(quality, false), (quality, true)]) {
-        let settings = Settings { quality, privacy, far_max_px: 24.0, highlights: 8.0, ..settings(CocKind::Depth) };
-        let [widest, none] = [Arch::new(), Arch::Scalar].map(|arch| {
-            let mut out = ColorImage::default();
-            let mut cpu = CpuBokeh::new(Plan::new(&settings, width, height), Some(2)).with_arch(arch);
-            cpu.blur(&image, Some(&map), &field, &mut out).expect("a blur");
-            out
-        });
-        let worst = codes_apart(&widest, &none);
-        assert!(worst <= 2, "{quality}, privacy {privacy}: {worst} codes");
-    }
 }
 
 #[test]

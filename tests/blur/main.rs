@@ -19,3 +19,4 @@ mod shaders;
 mod shared_frame;
 mod slices;
 mod steady;
+mod vectors;
