@@ -49,7 +49,7 @@ const DOORS: [(&str, &[&str]); 29] = [
     ("jiff", &["files/user_folders"]),
     ("lz4_flex", &["recording/mcap"]),
     ("lzfse_rust", &["recording/record3d"]),
-    ("moxcms", &["recording/icc"]),
+    ("moxcms", &["recording/color_space"]),
     ("pipewire", &["pipewire"]),
     ("png", &["recording", "sink"]),
     (

@@ -13,18 +13,17 @@ use bokehcam::look::Look;
 use bokehcam_media::files::place;
 use bokehcam_media::recording::depth_file::{self, DepthFile, DepthInside, Distances, EXTENSIONS};
 use bokehcam_media::recording::embedded::Focus;
+use bokehcam_media::recording::pictures::{self, MAP_SUFFIXES};
 use bokehcam_media::recording::{mask_file, snapshot, still};
 
-/// Suffixes of depth files, after the photo's stem and before [`EXTENSIONS`].
-const DEPTH: [&str; 2] = ["-depth", ".depth"];
 /// Suffix of a snapshot's picture before the blur.
 const COLOR: &str = "-color";
 
 /// Extensions of photos that may have a mask.
 const PHOTOS: [&str; 10] = ["jpg", "jpeg", "png", "webp", "tif", "tiff", "heic", "heif", "bmp", "gif"];
 
-/// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth` or `NAME.depth`, of any
-/// format), the mask of a photo that is there (`NAME-mask` or `NAME.mask`), or the picture of a snapshot before the blur.
+/// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth`, `NAME.depth` or
+/// `NAME_depth`, of any format) or another [companion](pictures::is_companion), the mask of a photo that is there (`NAME-mask` or `NAME.mask`), or the picture of a snapshot before the blur.
 pub fn is_companion(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let is_original = || {
@@ -37,7 +36,7 @@ pub fn is_companion(path: &Path) -> bool {
             PHOTOS.iter().any(|extension| has(extension) || has(&extension.to_uppercase()))
         })
     };
-    DEPTH.iter().any(|suffix| stem.ends_with(suffix)) || is_mask() || is_original()
+    pictures::is_companion(path) || is_mask() || is_original()
 }
 
 /// Returns the picture to use for a photo: for a snapshot, its picture before the blur.
@@ -106,8 +105,8 @@ pub(super) struct ReadPhoto {
     pub findings: Findings,
 }
 
-/// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the file `NAME-depth` or
-/// `NAME.depth` next to it, or inside it as phones save it, unless the options request another origin. A photo with depth
+/// Reads a photo, rotated upright; for a snapshot, its picture before the blur. Its depth is the file `NAME-depth`,
+/// `NAME.depth` or `NAME_depth` next to it, or inside it as phones save it, unless the options request another origin. A photo with depth
 /// inside is its sharp original, if that is inside, too.
 ///
 /// # Errors
@@ -204,7 +203,8 @@ pub fn is_depth_file_of(file: &Path, photo: &Path) -> bool {
 fn depth_file_paths(photo: &Path) -> impl Iterator<Item = PathBuf> {
     let stem = photo.file_stem().and_then(OsStr::to_str).map(|stem| stem.strip_suffix(COLOR).unwrap_or(stem));
     let name = move |stem: &str, ending: &str, extension| photo.with_file_name(format!("{stem}{ending}.{extension}"));
-    let of_stem =
-        move |stem| DEPTH.iter().flat_map(move |ending| EXTENSIONS.map(|extension| name(stem, ending, extension)));
+    let of_stem = move |stem| {
+        MAP_SUFFIXES.iter().flat_map(move |ending| EXTENSIONS.map(|extension| name(stem, ending, extension)))
+    };
     stem.into_iter().flat_map(of_stem)
 }

@@ -8,10 +8,12 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
+use image::codecs::{gif::GifDecoder, webp::WebPDecoder};
 use image::metadata::Orientation;
-use image::{ColorType, ImageDecoder, ImageFormat};
+use image::{AnimationDecoder, ColorType, ImageDecoder, ImageFormat};
 
 use super::MAX_PIXELS;
+use super::color_space;
 use super::decoders::{
     PICTURES, check_size, create_decoder, create_jpeg_decoder, create_png_decoder, decode_with, guard, sample_format,
 };
@@ -42,7 +44,7 @@ pub(super) enum EncodedPicture<'a> {
 }
 
 impl<'a> EncodedPicture<'a> {
-    /// Opens a PNG, JPEG, WebP, TIFF, BMP, GIF (its first frame) or, by an installed program, HEIC; `memory` receives a file that must be read completely.
+    /// Opens a PNG, JPEG, WebP, TIFF, BMP, PNM, GIF (its first frame) or, by an installed program, HEIC; `memory` receives a file that must be read completely.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
         guard(|| Self::open_unguarded(path, memory))
     }
@@ -88,9 +90,16 @@ impl<'a> EncodedPicture<'a> {
     /// Returns the colour profile, before the pixels.
     pub(super) fn icc_profile(&mut self) -> Option<Vec<u8>> {
         match self {
-            Self::Png(reader) => reader.info().icc_profile.as_deref().map(<[u8]>::to_vec),
+            Self::Png(reader) => color_space::of_png(reader.info()),
             Self::Whole(decoder) => guard(|| decoder.icc_profile().map_err(decoder_fault)).ok().flatten(),
         }
+    }
+
+    /// Returns the colour of the number 0 in the palette of a PNG, as RGB; `None` without a palette.
+    pub(super) fn palette_background(&self) -> Option<[u8; 3]> {
+        let Self::Png(reader) = self else { return None };
+        let palette = reader.info().palette.as_deref().filter(|_| reader.info().color_type == png::ColorType::Indexed);
+        palette?.first_chunk().copied()
     }
 
     pub(super) fn size(&self) -> (u32, u32) {
@@ -251,6 +260,25 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
 pub(super) fn read_stored_orientation(path: &Path) -> Option<Orientation> {
     let is_converted = read_kind(path)? == file_kind::HEIC;
     read_orientation(path).ok().filter(|_| !is_converted)
+}
+
+/// Returns whether a file has several pictures, which are shown one after another.
+pub(super) fn is_animated(path: &Path) -> bool {
+    let count = || -> Option<bool> {
+        let (file, kind) = open_detected(path).ok()?;
+        let reader = BufReader::new(file);
+        Some(match kind? {
+            FileKind::Png => {
+                create_png_decoder(reader.into_inner()).ok()?.read_info().ok()?.info().animation_control?.num_frames > 1
+            }
+            FileKind::Other(ImageFormat::WebP) => WebPDecoder::new(reader).ok()?.has_animation(),
+            FileKind::Other(ImageFormat::Gif) => {
+                GifDecoder::new(reader).ok()?.into_frames().take(2).flatten().count() > 1
+            }
+            _ => false,
+        })
+    };
+    guard(|| Ok(count().unwrap_or(false))).unwrap_or(false)
 }
 
 /// Returns the kind of a file by its first bytes; `None` if it is unknown or cannot be read.

@@ -6,10 +6,12 @@ use image::metadata::Orientation;
 use pulp::{Arch, WithSimd};
 
 use super::coded::{self, EncodedPicture};
+use super::color_space;
 use super::depth_covers;
 use super::fault::PictureFault;
 use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
 use super::samples::SampleFormat;
+use super::transparency::over_white;
 use super::upright::upright;
 use bokehcam::color::{luminance, round_to_8bit};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
@@ -63,7 +65,8 @@ pub(super) fn read_header(path: &Path) -> Result<((u32, u32), PictureKind), Pict
     Ok((size, kind))
 }
 
-/// Decodes to 8-bit RGB: grey is repeated, transparency ignored, 16 bits are rounded to 8. With `expected`, a picture
+/// Decodes to 8-bit RGB as it is shown, in sRGB: grey is repeated, what is transparent is in front of white, 16 bits are
+/// rounded to 8. With `expected`, a picture
 /// of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
 pub(super) fn read_color(
     path: &Path,
@@ -148,6 +151,18 @@ pub(super) fn decode_color(
     pixels: &mut Vec<u8>,
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
+    let mut metadata = decode_stored_color(coded, pixels, into)?;
+    // The profile no longer applies to what it has converted.
+    metadata.icc_profile.take_if(|profile| color_space::convert_to_srgb(profile, &mut into.rgb));
+    Ok(metadata)
+}
+
+/// Decodes an opened picture as [`read_color`] does, but in its own colour space.
+pub(super) fn decode_stored_color(
+    coded: EncodedPicture,
+    pixels: &mut Vec<u8>,
+    into: &mut ColorImage,
+) -> Result<PhotoMetadata, PictureFault> {
     let ((width, height), samples) = (coded.size(), coded.samples());
     into.resize(width, height);
     if samples == (SampleFormat { channels: 3, is_16bit: false }) {
@@ -157,10 +172,15 @@ pub(super) fn decode_color(
     let mut metadata = coded.decode_runs(pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            *rgb = channels.map(|channel| match samples.is_16bit {
+            let sample = |channel: usize| match samples.is_16bit {
                 true => round_to_8bit(sample_u16(pixel, channel)),
                 false => pixel[channel],
-            });
+            };
+            *rgb = channels.map(sample);
+            if samples.has_alpha() {
+                let alpha = sample(samples.channels - 1);
+                *rgb = rgb.map(|code| over_white(code, alpha));
+            }
         }
     })?;
     let lost = [(samples.has_alpha(), TRANSPARENCY), (samples.is_16bit, SIXTEEN_BITS)];
@@ -299,16 +319,25 @@ pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFaul
 }
 
 fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
-    decode_luma(coded, pixels, |at, luma, alpha| grey[at] = luma * alpha).map(drop)
+    decode_luma(coded, pixels, |at, pixel| grey[at] = pixel.luma * pixel.alpha).map(drop)
 }
 
-/// Decodes an opened picture, and calls `on_pixel` with the place of each pixel, its luma and its alpha, 0 to 1 as stored
-/// (1 without alpha). `pixels` is working memory.
+/// A pixel as stored (not linearised), 0 to 1.
+pub(super) struct LumaPixel {
+    pub(super) luma: f32,
+    /// 1 without alpha.
+    pub(super) alpha: f32,
+    /// Whether its channels differ by more than compression makes them.
+    pub(super) is_colored: bool,
+}
+
+/// Decodes an opened picture, and calls `on_pixel` with the place of each pixel and the pixel. `pixels` is working memory.
 pub(super) fn decode_luma(
     coded: EncodedPicture,
     pixels: &mut Vec<u8>,
-    mut on_pixel: impl FnMut(usize, f32, f32),
+    mut on_pixel: impl FnMut(usize, LumaPixel),
 ) -> Result<PhotoMetadata, PictureFault> {
+    const TOLERANCE: f32 = 8.0 / 255.0;
     let samples = coded.samples();
     coded.decode_runs(pixels, |run, row| {
         let places = (run.first..).step_by(run.step);
@@ -317,11 +346,15 @@ pub(super) fn decode_luma(
                 true => f32::from(sample_u16(pixel, channel)) / 65535.0,
                 false => f32::from(pixel[channel]) / 255.0,
             };
-            let luma = match samples.has_color() {
-                true => luminance(sample(0), sample(1), sample(2)),
-                false => sample(0),
+            let (luma, chroma) = match samples.has_color() {
+                true => {
+                    let [red, green, blue] = [sample(0), sample(1), sample(2)];
+                    (luminance(red, green, blue), (red - green).abs().max((blue - green).abs()))
+                }
+                false => (sample(0), 0.0),
             };
-            on_pixel(at, luma, if samples.has_alpha() { sample(samples.channels - 1) } else { 1.0 });
+            let alpha = if samples.has_alpha() { sample(samples.channels - 1) } else { 1.0 };
+            on_pixel(at, LumaPixel { luma, alpha, is_colored: chroma > TOLERANCE });
         }
     })
 }

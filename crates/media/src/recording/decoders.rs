@@ -17,7 +17,7 @@ use super::{MAX_PIXELS, MAX_SIDE_PX};
 use bokehcam::compute::catch_panic;
 
 /// What a message names where no picture is found.
-pub(super) const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP or GIF";
+pub(super) const PICTURES: &str = "PNG, JPEG, TIFF, WebP, BMP, PNM or GIF";
 
 /// Memory limit for a PNG's texts and profiles, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;

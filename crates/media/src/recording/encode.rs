@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
+use png::chunk::ChunkType;
 use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
@@ -100,6 +101,7 @@ pub(super) fn encode_photo_png(
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(PNG_FILTER);
     let mut writer = encoder.write_header()?;
+    metadata.png_chunks.iter().try_for_each(|(name, data)| writer.write_chunk(ChunkType(*name), data))?;
     writer.write_image_data(&bytes)?;
     writer.finish()
 }

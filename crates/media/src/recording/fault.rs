@@ -22,6 +22,9 @@ pub enum LineFault {
     Nanoseconds(String),
     #[error("{0:?} is not a time; write seconds >= 0 as a decimal number, such as 1305031102.175304")]
     Time(String),
+    /// The text is not a date and time.
+    #[error("{0:?} is not a date and time; write it as 2011-09-26 13:02:25.964389445")]
+    Date(String),
     /// The time is repeated or decreases.
     #[error("the time is out of order or repeated; sort the list by time, and name each time once")]
     OutOfOrder,

@@ -49,7 +49,7 @@ const XML: FileKind = FileKind::Foreign(
     "an XML file",
     "if it is an SVG drawing, convert it: rsvg-convert IN.svg -o OUT.png (package librsvg2-bin)",
 );
-const PNM: FileKind = FileKind::Foreign("a PNM picture", "convert it: convert IN.ppm OUT.png (package imagemagick)");
+const PNM: FileKind = FileKind::Other(ImageFormat::Pnm);
 
 /// Marks of files, the more specific ones first.
 const MARKS: [Mark; 31] = [

@@ -1,7 +1,6 @@
 //! Pictures of a folder, found, ordered and paired by their names.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::fs;
 use std::path::Path;
 
@@ -9,9 +8,9 @@ use super::MAX_ENTRIES;
 use super::error::{RecordingError, Result};
 
 /// Endings of pictures.
-const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+pub(super) const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "ppm", "pgm"];
 
-/// Splits the file name of a PNG or JPEG into stem and ending; `None` for another name.
+/// Splits the file name of a picture into stem and ending; `None` for another name.
 fn split_name(name: &str) -> Option<(&str, &str)> {
     split_known(name, &ENDINGS)
 }
@@ -22,7 +21,7 @@ fn split_known<'a>(name: &'a str, endings: &[&str]) -> Option<(&'a str, &'a str)
     name.rsplit_once('.').filter(|(stem, ending)| !stem.is_empty() && !stem.starts_with('.') && is_known(ending))
 }
 
-/// Returns the names of the PNG and JPEG files in `folder` whose stems are `wanted`, in natural order (2 before 10).
+/// Returns the names of the PNG, JPEG and PNM files in `folder` whose stems are `wanted`, in natural order (2 before 10).
 ///
 /// # Errors
 /// The folder cannot be listed, or contains more than [`MAX_ENTRIES`] of them.
@@ -133,14 +132,6 @@ impl<'a> Pictures<'a> {
     pub(super) fn find_in(&self, dir: &Path) -> Result<Vec<String>> {
         find_pictures(&dir.join(self.folder), |stem| self.middle(stem).is_some())
     }
-
-    fn key(&self, name: &str, by: PairKey) -> Option<String> {
-        let middle = self.middle(split_name(name)?.0)?;
-        match by {
-            PairKey::Name => Some(middle.to_owned()),
-            PairKey::Number => number_key(middle),
-        }
-    }
 }
 
 /// What two pictures of a pair have in common.
@@ -149,49 +140,108 @@ pub(super) enum PairKey {
     /// The stem, apart from prefix and suffix.
     Name,
     /// All numbers in it, by value.
-    Number,
+    Numbers,
+    /// The first number, which counts the frames where the others are times.
+    FirstNumber,
 }
 
-/// Pairs pictures by name, or if that gives no pair by number. Returns pairs in the order of `names`, and what they
-/// have in common.
+impl PairKey {
+    /// All, in order of preference.
+    const ALL: [Self; 3] = [Self::Name, Self::Numbers, Self::FirstNumber];
+
+    /// Returns what they have in common in words.
+    pub(super) fn describe(self) -> &'static str {
+        match self {
+            Self::Name => "names",
+            Self::Numbers => "numbers",
+            Self::FirstNumber => "first numbers",
+        }
+    }
+
+    /// Returns what a stem has of this; `None` for nothing.
+    fn of(self, stem: &str) -> Option<String> {
+        match self {
+            Self::Name => Some(stem.to_owned()),
+            Self::Numbers => number_key(stem),
+            Self::FirstNumber => number_key(stem)?.split(' ').next().map(str::to_owned),
+        }
+    }
+
+    /// Returns the position of each stem that has this.
+    ///
+    /// # Errors
+    /// Returns the positions of two stems that have the same.
+    fn index(self, stems: &[&str]) -> Result<HashMap<String, usize>, [usize; 2]> {
+        let mut index = HashMap::new();
+        for (at, stem) in stems.iter().enumerate() {
+            let Some(key) = self.of(stem) else { continue };
+            if let Some(other) = index.insert(key, at) {
+                return Err([other, at]);
+            }
+        }
+        Ok(index)
+    }
+}
+
+/// The positions of two stems that no map can be told for, and whether they are those of maps.
+pub(super) struct Ambiguous {
+    pub(super) positions: [usize; 2],
+    pub(super) are_maps: bool,
+}
+
+/// Pairs the stems of pictures and maps by what pairs all of either, or else some. Returns the position of each picture's
+/// map, and what the two have in common.
 ///
 /// # Errors
-/// Two pictures of one kind have the same number.
+/// No picture has a map, and two pictures or maps have the same name or number.
+pub(super) fn pair_stems(pictures: &[&str], maps: &[&str]) -> Result<(Vec<Option<usize>>, PairKey), Ambiguous> {
+    let pair_by = |by: PairKey| {
+        let index = by.index(maps).map_err(|positions| Ambiguous { positions, are_maps: true })?;
+        // Numbers that occur twice must not take the first map that fits.
+        by.index(pictures).map_err(|positions| Ambiguous { positions, are_maps: false })?;
+        Ok(pictures.iter().map(|stem| index.get(&by.of(stem)?).copied()).collect::<Vec<_>>())
+    };
+    let (mut best, mut ambiguous) = (None, None);
+    for by in PairKey::ALL {
+        match pair_by(by) {
+            Ok(pairs) => match pairs.iter().flatten().count() {
+                count if count == pictures.len().min(maps.len()) => return Ok((pairs, by)),
+                0 => {}
+                _ => best = best.or(Some((pairs, by))),
+            },
+            // A first number that occurs twice counts no frames.
+            Err(_) if by == PairKey::FirstNumber => {}
+            Err(error) => ambiguous = ambiguous.or(Some(error)),
+        }
+    }
+    match (best, ambiguous) {
+        (None, Some(error)) => Err(error),
+        (best, _) => Ok(best.unwrap_or_else(|| (vec![None; pictures.len()], PairKey::Name))),
+    }
+}
+
+/// Pairs pictures as [`pair_stems`] does. Returns pairs in the order of `names`, and what they have in common.
+///
+/// # Errors
+/// No picture has a map, and two pictures or maps have the same name or number.
 pub(super) fn pair_by_name(
     dir: &Path,
     (color, names): (Pictures, Vec<String>),
     (depth, maps): (Pictures, Vec<String>),
 ) -> Result<(Vec<(String, String)>, PairKey)> {
-    let pair_by = |by| {
-        let mut partners = index_by_key(dir, depth, &maps, by)?;
-        // Numbers that occur twice must not take the first map that fits.
-        index_by_key(dir, color, &names, by)?;
-        let pairs =
-            names.iter().filter_map(|name| Some((name.clone(), partners.remove(&color.key(name, by)?)?.clone())));
-        Ok::<Vec<_>, RecordingError>(pairs.collect())
+    let middles = |kind: &Pictures, names: &'_ [String]| -> Vec<String> {
+        let middle = |name: &String| kind.middle(split_name(name)?.0).map(str::to_owned);
+        names.iter().map(|name| middle(name).unwrap_or_default()).collect()
     };
-    let by_name = pair_by(PairKey::Name)?;
-    if by_name.is_empty() { Ok((pair_by(PairKey::Number)?, PairKey::Number)) } else { Ok((by_name, PairKey::Name)) }
-}
-
-fn index_by_key<'a>(
-    dir: &Path,
-    pictures: Pictures,
-    names: &'a [String],
-    by: PairKey,
-) -> Result<HashMap<String, &'a String>> {
-    let mut index = HashMap::new();
-    for name in names {
-        let Some(key) = pictures.key(name, by) else { continue };
-        match index.entry(key) {
-            Entry::Vacant(free) => free.insert(name),
-            Entry::Occupied(other) => {
-                let path = dir.join(pictures.folder).join(name);
-                return Err(RecordingError::SameNumber { path, other: (*other.get()).clone() });
-            }
-        };
-    }
-    Ok(index)
+    let [pictures, stems] = [middles(&color, &names), middles(&depth, &maps)];
+    let [pictures, stems] = [&pictures, &stems].map(|stems| stems.iter().map(String::as_str).collect::<Vec<_>>());
+    let (partners, by) =
+        pair_stems(&pictures, &stems).map_err(|Ambiguous { positions: [first, second], are_maps }| {
+            let (folder, names) = if are_maps { (depth.folder, &maps) } else { (color.folder, &names) };
+            RecordingError::SameNumber { path: dir.join(folder).join(&names[second]), other: names[first].clone() }
+        })?;
+    let pairs = names.into_iter().zip(partners);
+    Ok((pairs.filter_map(|(name, map)| Some((name, maps[map?].clone()))).collect(), by))
 }
 
 #[cfg(test)]
@@ -220,6 +270,24 @@ mod tests {
         assert_ne!(number_key("1_10"), number_key("11_0"));
         assert_ne!(number_key("1305031102.175304"), number_key("1305031102.160407"));
         assert_eq!(number_key("thumb"), None);
+    }
+
+    #[test]
+    fn what_pairs_all_decides() {
+        let pair = |pictures: &[&str], maps: &[&str]| {
+            let (maps, by) = pair_stems(pictures, maps).map_err(|error| error.positions)?;
+            Ok((maps.into_iter().map(|map| map.map_or(9, |map| map)).collect::<Vec<_>>(), by))
+        };
+        assert_eq!(pair(&["a1", "b2"], &["b2", "a1"]), Ok((vec![1, 0], PairKey::Name)));
+        assert_eq!(pair(&["rgb1", "rgb2"], &["d01", "d02"]), Ok((vec![0, 1], PairKey::Numbers)));
+        // One equal name among times that differ.
+        let pictures = ["1-000", "2-331", "3-662"];
+        assert_eq!(pair(&pictures, &["1-000", "2-322", "3-655"]), Ok((vec![0, 1, 2], PairKey::FirstNumber)));
+        assert_eq!(pair(&["a", "b"], &["c"]), Ok((vec![9, 9], PairKey::Name)));
+        // Some have a map.
+        assert_eq!(pair(&["a1", "a2", "a3"], &["a2", "b7"]), Ok((vec![9, 0, 9], PairKey::Name)));
+        // Two of a number are never told apart by their order.
+        assert_eq!(pair(&["a1", "b1"], &["c1"]), Err([0, 1]));
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! Depth maps of the pictures of a video or a folder: a file for each in a folder, of any format of single maps.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::depth_file::{self, DepthFile, Distances};
+use super::depth_file::{self, DepthFile, Distances, scale_beside};
 use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
-use super::folder::{find_files, has_files};
+use super::folder::{Ambiguous, PairKey, find_files, has_files, pair_stems};
 use super::{LAYOUTS, pictures};
 
 /// Number of maps, spread over the sequence, whose numbers decide the range of relative depth.
@@ -60,19 +60,30 @@ impl MapSequence {
             Pictured::Frames(count) => count,
             Pictured::Files(stems) => Some(stems.len() as u64),
         };
-        let how = if by_stem.is_some() { "by the names of the pictures" } else { "in the order of their names" };
-        let names = by_stem.map_or_else(|| pair_by_order(dir, &found, count, played), Ok)?;
+        let (names, how) = match by_stem {
+            Some((names, by)) => (names, format!("by the {} of the pictures", by.describe())),
+            None => (pair_by_order(dir, &found, count, played)?, "in the order of their names".to_owned()),
+        };
         let missing = names.iter().collect::<HashSet<_>>().difference(&found.iter().collect()).count();
         let files: Vec<_> = names.iter().map(|name| dir.join(name)).collect();
+        let (mut options, mut notes) = (options, Vec::new());
+        if let Some((scale, invalid, note)) =
+            files.first().filter(|_| options.scale.is_none()).and_then(|file| scale_beside(file))
+        {
+            (options.scale, options.invalid) =
+                (Some(scale), options.invalid.filter(|&invalid| invalid != 0.0).or(invalid));
+            notes.push(note);
+        }
         let samples = || files.iter().step_by(files.len().div_ceil(RANGE_SAMPLES).max(1));
         let mut fault = None;
         let read = |path: &PathBuf| {
             depth_file::read_unfitted(path, &options).map_err(|new| fault = Some((path.clone(), new))).ok()
         };
-        let Some(DepthFile { distances, mut notes, .. }) = samples().find_map(read) else {
+        let Some(DepthFile { distances, notes: assumed, .. }) = samples().find_map(read) else {
             let (path, fault) = fault.unwrap_or((dir.to_owned(), PictureFault::Missing));
             return Err(RecordingError::picture(&path)(fault));
         };
+        notes.extend(assumed);
         notes.insert(0, format!("{} depth maps {how}", files.len() - missing));
         notes.extend((missing > 0).then(|| format!("pictures without a depth map: {missing}")));
         notes.iter_mut().for_each(|note| *note = format!("{}: {note}", dir.display()));
@@ -169,23 +180,34 @@ fn fill_gaps(names: &[String]) -> Vec<String> {
     (*first..=*last).map(name).collect()
 }
 
-/// Returns the name of the map of each picture by the picture's own; `None` if no picture has one.
+/// Returns the name of the map of each picture by the picture's own, and what they have in common; `None` if no picture has
+/// one.
 ///
 /// # Errors
 /// Two maps have the name of one picture.
-fn pair_by_stem(dir: &Path, names: &[String], stems: &[String]) -> Result<Option<Vec<String>>> {
-    let mut by_stem: HashMap<&str, &String> = HashMap::new();
-    for name in names {
+fn pair_by_stem(dir: &Path, names: &[String], stems: &[String]) -> Result<Option<(Vec<String>, PairKey)>> {
+    let stem = |name: &'_ String| -> String {
         let stem = name.rsplit_once('.').map_or(&**name, |(stem, _)| stem);
-        let stem = pictures::MAP_SUFFIXES.iter().find_map(|suffix| stem.strip_suffix(suffix)).unwrap_or(stem);
-        if let Some(other) = by_stem.insert(stem, name) {
-            return Err(RecordingError::SameNumber { path: dir.join(name), other: other.clone() });
+        pictures::MAP_SUFFIXES.iter().find_map(|suffix| stem.strip_suffix(suffix)).unwrap_or(stem).to_owned()
+    };
+    let maps: Vec<String> = names.iter().map(stem).collect();
+    let [pictured, maps] = [stems, &maps].map(|stems| stems.iter().map(String::as_str).collect::<Vec<_>>());
+    let (partners, by) = match pair_stems(&pictured, &maps) {
+        Ok(paired) => paired,
+        Err(Ambiguous { positions: [first, second], are_maps: true }) => {
+            return Err(RecordingError::SameNumber { path: dir.join(&names[second]), other: names[first].clone() });
         }
+        Err(_) => return Ok(None),
+    };
+    // Numbers may count from another one than those of the pictures.
+    if by != PairKey::Name && partners.contains(&None) {
+        return Ok(None);
     }
     let ending = names.first().and_then(|name| name.rsplit_once('.')).map_or("png", |(_, ending)| ending);
-    let found = |stem: &String| by_stem.get(&**stem).copied();
-    let all = || stems.iter().map(|stem| found(stem).map_or_else(|| format!("{stem}.{ending}"), String::clone));
-    Ok(stems.iter().any(|stem| found(stem).is_some()).then(|| all().collect()))
+    let name = |(stem, map): (&String, &Option<usize>)| {
+        map.map_or_else(|| format!("{stem}.{ending}"), |map| names[map].clone())
+    };
+    Ok(partners.iter().any(Option::is_some).then(|| (stems.iter().zip(&partners).map(name).collect(), by)))
 }
 
 #[cfg(test)]
@@ -235,7 +257,7 @@ mod tests {
     fn pictures_with_names_have_maps_of_these() {
         let pair = |names: &[&str], stems: &[&str]| pair_by_stem(Path::new("maps"), &owned(names), &owned(stems));
         let found = pair(&["IMG_2.npy", "IMG_1-depth.npy"], &["IMG_1", "IMG_2", "IMG_3"]).unwrap();
-        assert_eq!(found.unwrap(), ["IMG_1-depth.npy", "IMG_2.npy", "IMG_3.npy"]);
+        assert_eq!(found.unwrap().0, ["IMG_1-depth.npy", "IMG_2.npy", "IMG_3.npy"]);
         assert_eq!(pair(&["0.png"], &["IMG_1"]).unwrap(), None);
         assert!(matches!(pair(&["a.png", "a.npy"], &["a"]), Err(RecordingError::SameNumber { .. })));
     }

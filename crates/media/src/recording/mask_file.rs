@@ -5,12 +5,14 @@ use std::path::Path;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 
-use super::coded::EncodedPicture;
-use super::decode::{self, Scratch};
+use super::coded::{self, EncodedPicture};
+use super::decode::{self, LumaPixel, Scratch};
 use super::depth_file::{describe_stretch, is_stretchable};
 use super::error::RecordingError;
 use super::fault::PictureFault;
+use super::file_kind::FileKind;
 use super::upright::upright;
+use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
 
 /// Suffixes of the masks of pictures, after the picture's stem.
@@ -18,6 +20,8 @@ const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
 
 /// Change of a value that lossy compression makes.
 const TOLERANCE: f32 = 8.0 / 255.0;
+/// Largest code of a mask that numbers objects: far darker than any coverage that is meant.
+const MAX_LABEL: f32 = 31.0;
 /// Share of the pixels whose colours may differ from a mask.
 const MAX_SHARE: f32 = 0.005;
 
@@ -36,8 +40,9 @@ pub fn picture_stem(stem: &str) -> Option<&str> {
 }
 
 /// Reads the mask of a picture of `color` (columns, rows) pixels, upright by its orientation tag, and scaled down to that
-/// size if it is larger. Its alphas are those of the file, if they differ, as in a picture that was cut out; else its luma
-/// as stored (not linearised), multiplied by alpha.
+/// size if it is larger. Its alphas are those of the file, if they differ, as in a picture that was cut out; 0 and 1 if it
+/// numbers objects, by a palette with colours or by small codes; else its luma as stored (not linearised), multiplied by
+/// alpha.
 ///
 /// # Errors
 /// The file is missing, no picture, too large, truncated or damaged; or it has another aspect ratio and is no square, as
@@ -49,36 +54,69 @@ pub fn read(path: &Path, color: (u32, u32)) -> Result<MaskFile, RecordingError> 
         if !is_stretchable((width, height), color) {
             return Err(PictureFault::MaskSize { found: (width, height), color });
         }
-        let notes = note.into_iter().chain(describe_stretch((width, height), color)).collect();
+        let notes = note.into_iter().map(str::to_owned).chain(describe_stretch((width, height), color)).collect();
         Ok(MaskFile { mask: reduce(mask, (width.min(color.0), height.min(color.1))), notes })
     };
     read().map_err(RecordingError::picture(path))
 }
 
+/// How the numbers of a mask are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reading {
+    /// Its alpha, as in a picture that was cut out.
+    Alpha,
+    /// Its luma, multiplied by alpha.
+    Luma,
+    /// Numbers of objects: 0 is the background.
+    Labels,
+}
+
 /// Reads a mask in the size of its file, and what was assumed.
-fn read_unfitted(path: &Path) -> Result<(Mask, Option<String>), PictureFault> {
+fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFault> {
     let mut scratch = Scratch::default();
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let size = coded.size();
+    let (size, samples) = (coded.size(), coded.samples());
+    let background = coded.palette_background().map(|rgb| {
+        let [red, green, blue] = rgb.map(|code| f32::from(code) / 255.0);
+        luminance(red, green, blue)
+    });
     let pixels = size.0 as usize * size.1 as usize;
     let mut grey = vec![0.0; pixels];
-    let mut alphas = if coded.samples().has_alpha() { vec![1.0; pixels] } else { Vec::new() };
-    let (mut lowest, mut highest, mut unequal) = (1.0_f32, 0.0_f32, 0);
-    let mut metadata = decode::decode_luma(coded, &mut scratch.pixels, |at, luma, alpha| {
+    let mut alphas = if samples.has_alpha() { vec![1.0; pixels] } else { Vec::new() };
+    let (mut lowest, mut highest, mut brightest) = (1.0_f32, 0.0_f32, 0.0_f32);
+    let (mut unequal, mut colored) = (0, 0);
+    let white = if samples.is_16bit { 65535.0 } else { 255.0 };
+    let is_jpeg = coded::read_kind(path) == Some(FileKind::Jpeg);
+    let mut metadata = decode::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
+        let LumaPixel { luma, alpha, is_colored } = pixel;
         grey[at] = luma * alpha;
         if let Some(place) = alphas.get_mut(at) {
             *place = alpha;
         }
-        (lowest, highest) = (lowest.min(alpha), highest.max(alpha));
+        (lowest, highest, brightest) = (lowest.min(alpha), highest.max(alpha), brightest.max(luma));
         unequal += usize::from(alpha - luma * alpha > TOLERANCE);
+        colored += usize::from(is_colored && alpha > 0.0);
     })?;
-    let is_cut_out = highest - lowest > TOLERANCE;
-    let is_said = is_cut_out && unequal as f32 > MAX_SHARE * pixels as f32;
-    let stored = if is_cut_out { alphas } else { grey };
+    let is_many = |count: usize| count as f32 > MAX_SHARE * pixels as f32;
+    let reading = match () {
+        () if highest - lowest > TOLERANCE => Reading::Alpha,
+        () if background.is_some() && colored > 0 => Reading::Labels,
+        // Compression makes such codes of black.
+        () if !is_jpeg && (0.5..=MAX_LABEL).contains(&(brightest * white)) => Reading::Labels,
+        () => Reading::Luma,
+    };
+    let (stored, note) = match reading {
+        Reading::Alpha => (alphas, is_many(unequal).then_some("its alpha is taken as the mask, not its colours")),
+        Reading::Luma => (grey, is_many(colored).then_some("it has colours, whose luma is taken as the mask")),
+        Reading::Labels => {
+            let background = background.filter(|_| colored > 0).unwrap_or(0.0);
+            grey.iter_mut().for_each(|grey| *grey = f32::from((*grey - background).abs() * white > 0.5));
+            (grey, Some("it numbers objects: 0 is taken as the background, and all others are the subject"))
+        }
+    };
     let transform = upright(metadata.take_orientation());
     let alpha = if transform.is_identity() { stored } else { transform.apply_to_pixels(&stored, size) };
     let (width, height) = transform.rotated_size(size);
-    let note = is_said.then(|| "its alpha is taken as the mask, not its colours".to_owned());
     Ok((Mask { width, height, alpha }, note))
 }
 

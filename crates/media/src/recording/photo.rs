@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use super::coded::EncodedPicture;
+use super::coded::{self, EncodedPicture};
 use super::decode::{self, sample_u16};
 use super::encode::Raster;
 use super::fault::PictureFault;
 use super::photo_metadata::{SIXTEEN_BITS, TRANSPARENCY};
 use super::still::{PhotoFormat, photo_format, write_raster};
+use super::transparency::{fill_hidden, over_white};
 use super::upright::upright;
-use super::{PhotoMetadata, RecordingError, icc};
-use bokehcam::color::{Picture16, ToneCurves};
+use super::{PhotoMetadata, RecordingError, color_space};
+use bokehcam::color::{Picture16, ToneCurves, round_to_8bit};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::transform::Transform;
 
@@ -23,12 +24,13 @@ pub struct Photo {
     pub codes: Option<Picture16>,
     /// Whether its file has 16 bits a channel.
     pub is_16bit: bool,
-    /// Alpha of every pixel, 65535 = opaque; `None` if all are opaque. Colours are not multiplied by it.
+    /// Alpha of every pixel, 65535 = opaque; `None` if all are opaque. Colours are not multiplied by it; where it is 0, they
+    /// are those of the nearest visible pixel.
     pub alpha: Option<Vec<u16>>,
     /// Profile, EXIF and XMP; the orientation is upright.
     pub metadata: PhotoMetadata,
-    /// What was assumed about its colours, for a message.
-    pub note: Option<&'static str>,
+    /// What was assumed or left out, a line each.
+    pub notes: Vec<&'static str>,
 }
 
 impl Photo {
@@ -41,6 +43,9 @@ impl Photo {
         let decoded = EncodedPicture::open(path, &mut file).and_then(Self::decode);
         let mut photo = decoded.map_err(RecordingError::picture(path))?;
         drop(file);
+        photo
+            .notes
+            .extend(coded::is_animated(path).then_some("is animated: its first picture is used; `stream` plays a GIF"));
         let orientation = photo.metadata.take_orientation();
         photo.transform(&upright(orientation));
         Ok(photo)
@@ -49,15 +54,15 @@ impl Photo {
     /// Decodes a photo as it is stored; `codes` only with 16 bits, or other tone curves than sRGB's.
     fn decode(mut coded: EncodedPicture) -> Result<Self, PictureFault> {
         let (size, samples) = (coded.size(), coded.samples());
-        let profile = coded.icc_profile().filter(|profile| icc::is_rgb(profile));
-        let curves = profile.as_deref().map(icc::read_tone_curves);
-        let note = matches!(curves, Some(None)).then_some(icc::NO_CURVES);
+        let profile = coded.icc_profile().filter(|profile| color_space::is_rgb(profile));
+        let curves = profile.as_deref().map(color_space::read_tone_curves);
+        let notes = matches!(curves, Some(None)).then_some(color_space::NO_CURVES).into_iter().collect();
         let curves = curves.flatten().unwrap_or_else(|| ToneCurves::srgb().clone());
         let is_16bit = samples.is_16bit;
-        let mut photo = Self { is_16bit, note, ..Self::default() };
+        let mut photo = Self { is_16bit, notes, ..Self::default() };
         let has_codes = is_16bit || !curves.are_srgb();
         if !has_codes && !samples.has_alpha() {
-            photo.metadata = decode::decode_color(coded, &mut Vec::new(), &mut photo.color)?;
+            photo.metadata = decode::decode_stored_color(coded, &mut Vec::new(), &mut photo.color)?;
             return Ok(photo);
         }
         photo.color.resize(size.0, size.1);
@@ -82,6 +87,13 @@ impl Photo {
                 }
             }
         })?;
+        if let Some(alpha) = &alpha {
+            let width = size.0 as usize;
+            match &mut codes {
+                Some(codes) => fill_hidden(codes.rgb.as_chunks_mut::<3>().0, alpha, width),
+                None => fill_hidden(photo.color.rgb.as_chunks_mut::<3>().0, alpha, width),
+            }
+        }
         if let Some(codes) = &codes {
             photo.color.rgb = codes.to_srgb();
         }
@@ -132,6 +144,12 @@ impl Photo {
         }
     }
 
+    /// Converts 8-bit sRGB codes, such as those of a background, to the primaries of this photo, with sRGB's tone curve as
+    /// `color` has them.
+    pub fn convert_from_srgb(&self, rgb: &mut [u8]) {
+        self.metadata.icc_profile.iter().for_each(|profile| color_space::convert_to_primaries(profile, rgb));
+    }
+
     /// Writes it in the format of the file name, with all that the format holds; returns the rest, in words for a
     /// message. The thumbnail in EXIF, which shows the picture before the blur, is left out.
     ///
@@ -145,11 +163,22 @@ impl Photo {
         let lost =
             [(self.alpha.is_some() && !holds_alpha, TRANSPARENCY), (self.is_16bit && !holds_16bit, SIXTEEN_BITS)];
         metadata.lost_properties.extend(lost.iter().filter(|(is_lost, _)| *is_lost).map(|(_, words)| words));
-        let alpha = self.alpha.as_deref().filter(|_| holds_alpha);
+        let kept = self.alpha.as_deref().filter(|_| holds_alpha);
+        let size = self.color.size();
         let raster = match self.codes {
-            Some(codes) if self.is_16bit && holds_16bit => Raster::from_16bit(codes.size(), codes.rgb, alpha),
-            Some(codes) => Raster::from_8bit(codes.size(), codes.to_8bit(), alpha),
-            None => Raster::from_8bit(self.color.size(), self.color.rgb, alpha),
+            Some(codes) if self.is_16bit && holds_16bit => Raster::from_16bit(codes.size(), codes.rgb, kept),
+            codes => {
+                let (size, mut rgb) = match codes {
+                    Some(codes) => (codes.size(), codes.to_8bit()),
+                    None => (size, self.color.rgb),
+                };
+                for (rgb, &alpha) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(self.alpha.iter().flatten()) {
+                    if !holds_alpha {
+                        *rgb = rgb.map(|code| over_white(code, round_to_8bit(alpha)));
+                    }
+                }
+                Raster::from_8bit(size, rgb, kept)
+            }
         };
         write_raster(path, &raster, &metadata, force)?;
         Ok(metadata.lost_properties)

@@ -4,7 +4,7 @@ use image::ImageDecoder;
 use image::metadata::Orientation;
 
 use super::tiff_directory::TiffDirectories;
-use super::{icc, image_resources, xmp};
+use super::{color_space, image_resources, xmp};
 use bokehcam::compute::catch_panic;
 use bokehcam::names;
 
@@ -31,6 +31,9 @@ pub struct PhotoMetadata {
     pub exif: Option<Vec<u8>>,
     /// XMP packet, with rights and authors.
     pub xmp: Option<String>,
+    /// Chunks of a PNG (name, data) with its print size, and its colours if they are not stated by a profile; `icc_profile`
+    /// then states the same.
+    pub png_chunks: Vec<([u8; 4], Vec<u8>)>,
     /// Photoshop's image resources without thumbnails, with captions and rights as IPTC.
     pub image_resources: Option<Vec<u8>>,
     /// What is lost on reading or writing, in words for a message.
@@ -51,7 +54,8 @@ impl PhotoMetadata {
     pub(super) fn from_png(info: &png::Info) -> Self {
         let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
         let mut metadata = Self { exif, ..Self::default() };
-        metadata.set_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
+        metadata.set_profile(color_space::of_png(info));
+        metadata.png_chunks = color_space::chunks_of_png(info);
         if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == xmp::PNG_KEYWORD) {
             let mut chunk = chunk.clone();
             // Limit decompression to a sensible size.
@@ -85,7 +89,7 @@ impl PhotoMetadata {
     /// Keeps a profile only if it is for RGB: the pixels become RGB, so a grey or CMYK profile no longer applies.
     fn set_profile(&mut self, profile: Option<Vec<u8>>) {
         match profile {
-            Some(profile) if !icc::is_rgb(&profile) => {
+            Some(profile) if !color_space::is_rgb(&profile) => {
                 self.lost_properties.push("a colour profile that is not of RGB (the blur uses sRGB's tone curve)");
             }
             profile => self.icc_profile = profile,
@@ -125,6 +129,14 @@ impl PhotoMetadata {
     /// Drops metadata that a format does not hold.
     #[must_use]
     pub fn for_format(mut self, format: PhotoFormat) -> Self {
+        if format == PhotoFormat::Png {
+            let has_chunks = self.png_chunks.iter().any(|(name, _)| color_space::is_color_chunk(*name));
+            self.icc_profile.take_if(|_| has_chunks);
+        } else {
+            let had_size = self.png_chunks.iter().any(|(name, _)| !color_space::is_color_chunk(*name));
+            self.lost_properties.extend(had_size.then_some("the print size (pHYs)"));
+            self.png_chunks.clear();
+        }
         match format {
             PhotoFormat::Jpeg => return self.for_jpeg(),
             PhotoFormat::Tiff => {}

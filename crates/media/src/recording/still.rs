@@ -21,8 +21,8 @@ use crate::files::atomic_file;
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 
-/// Reads a PNG or JPEG (detected by content) as 8-bit RGB, rotated upright by its orientation tag. Grey is repeated,
-/// transparency ignored, 16 bits are rounded to 8. At most 16384 pixels a side, and 120 megapixels.
+/// Reads a PNG or JPEG (detected by content) as it is shown, in 8-bit sRGB, rotated upright by its orientation tag.
+/// Grey is repeated, what is transparent is in front of white, 16 bits are rounded to 8. At most 16384 pixels a side, and 120 megapixels.
 ///
 /// # Errors
 /// The file is missing, not a PNG or JPEG, too large, truncated or damaged.

@@ -1,12 +1,13 @@
 //! Blurs a photo in the form that keeps most of it.
 
 use std::mem;
+use std::sync::Arc;
 
 use crate::log;
 use bokehcam::bokeh::BokehError;
 use bokehcam::compute::Backend;
 use bokehcam::computing::ComputeOptions;
-use bokehcam::depth::backdrop::Background;
+use bokehcam::depth::backdrop::{Background, BackgroundPicture};
 use bokehcam::engine::still::{Depth, Rendered, render_picture};
 use bokehcam::look::Look;
 use bokehcam_media::recording::Photo;
@@ -22,6 +23,7 @@ pub(super) fn blur(
     if is_transparent && photo.is_16bit {
         log::note("--behind transparent: what is blurred gets 8 bits; what is sharp keeps its 16");
     }
+    let look = &adapt_background(look, photo);
     let wants_gpu = computing.backend == Backend::Gpu || computing.adapter.is_some();
     if wants_gpu && photo.codes.is_some() && !is_transparent {
         log::note("16 bits and tone curves other than sRGB's are blurred by the processor, not the GPU");
@@ -31,4 +33,22 @@ pub(super) fn blur(
     (photo.color, photo.codes) = (color, codes);
     alpha.iter().for_each(|alpha| photo.multiply_alpha(alpha));
     Ok(by)
+}
+
+/// Returns the look with the colours of its background converted to those of the photo, which keeps its colour space.
+fn adapt_background(look: &Look, photo: &Photo) -> Look {
+    let mut look = look.clone();
+    match &mut look.background {
+        Background::Color(rgb) => photo.convert_from_srgb(rgb),
+        Background::Picture(picture) => {
+            let mut image = picture.image.clone();
+            photo.convert_from_srgb(&mut image.rgb);
+            *picture = Arc::new(BackgroundPicture { file: picture.file.clone(), image });
+        }
+        Background::Video(_) if photo.metadata.icc_profile.is_some() => {
+            log::note("--behind video: its colours are taken as those of the photo, which has its own colour profile");
+        }
+        Background::Blur | Background::Video(_) | Background::Transparent => {}
+    }
+    look
 }

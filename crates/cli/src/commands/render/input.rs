@@ -58,7 +58,7 @@ pub(super) fn read_input(command: &RenderCommand, look: &Look) -> Result<Input, 
         return Err(CliError::NoOriginal(image));
     }
     let mut photo = Photo::read(&image)?;
-    photo.note.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
+    photo.notes.iter().for_each(|note| log::note(&format!("{}: {note}", image.display())));
     // Maps and masks are of the picture as it is in its file, and are turned and cut with it.
     let own_px = photo.color.size();
     transform_photo(command.orientation, &image.display().to_string(), &mut photo)?;

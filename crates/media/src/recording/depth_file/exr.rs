@@ -7,7 +7,7 @@ use exr::block::reader::ChunksReader;
 use exr::block::{self, lines::LineRef};
 use exr::error::Error;
 use exr::io::Data;
-use exr::meta::attribute::{ChannelDescription, SampleType};
+use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
 
@@ -15,24 +15,22 @@ use super::values::{ColorCount, Samples, Values};
 use crate::recording::MAX_PIXELS;
 use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
-
-/// Names of a channel with depth, in order of preference: the standard's, those of renderers, grey, and colours.
-const NAMES: [&str; 6] = ["Z", "depth", "V", "Y", "R", "X"];
+use crate::recording::role::Role;
 
 /// Most samples in a layer, which are decompressed to find those of one channel: a hundred channels of 19 megapixels.
 const MAX_SAMPLES: u64 = 16 * MAX_PIXELS;
 /// Most bytes in a block, a tile or some rows of all channels: the decoder has memory for some blocks.
 const MAX_BLOCK_BYTES: usize = 256 << 20;
 
-/// Reads the channel with depth of the first layer that has one, block by block, and no other layer.
+/// Reads the layer with depth that [`choose`] chooses, block by block, and no other one.
 pub(super) fn read(file: File) -> Result<Values, PictureFault> {
     let reader = block::read(BufReader::new(file), false).map_err(fault)?;
     for header in reader.headers() {
         check_side(header)?;
     }
-    let (layer, channel) = find_depth(reader.headers())
-        .ok_or_else(|| PictureFault::NotAMap("an EXR without a channel Z, V or Y".to_owned()))?;
-    let header = &reader.headers()[layer];
+    let Choice { layer, channels: wanted, note } = choose(reader.headers())
+        .ok_or_else(|| PictureFault::NotAMap("an EXR without a layer of depth (Z, or one named depth)".to_owned()))?;
+    let header = &reader.headers()[layer].clone();
     let size = check_side(header)?;
     let channels = header.channels.list.len();
     let samples = channels as u64 * u64::from(size.0) * u64::from(size.1);
@@ -41,7 +39,6 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
         return Err(PictureFault::NotAMap(what));
     }
 
-    let wanted: Vec<usize> = [channel].into_iter().chain(find_colors_beside(header, channel)).collect();
     let (width, pixels) = (size.0 as usize, size.0 as usize * size.1 as usize);
     let mut numbers = vec![vec![0.0; pixels]; wanted.len()];
     let chunks =
@@ -65,39 +62,87 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
         red.iter().zip(green.iter().zip(blue)).for_each(|(red, (green, blue))| colors.add([*red, *green, *blue]));
         colors.check(pixels)?;
     }
-    Ok(Values { size, numbers: numbers.swap_remove(0), samples: Samples::Float, ..Values::default() })
+    let (size, numbers) = place_in_display(header, numbers.swap_remove(0))?;
+    Ok(Values { size, numbers, samples: Samples::Float, notes: note.into_iter().collect(), ..Values::default() })
 }
 
-/// Returns the layer and the channel with depth. A layer of colours may come before that of depth.
-fn find_depth(headers: &[Header]) -> Option<(usize, usize)> {
-    NAMES.iter().find_map(|name| {
-        headers.iter().enumerate().filter(|(_, header)| !header.deep).find_map(|(layer, header)| {
-            let channel = header.channels.list.iter().position(|channel| is_named(channel, name))?;
-            Some((layer, channel))
-        })
-    })
-}
-
-/// Returns whether a channel has this name, within a layer (`View.Depth.Z`) or as one (`depth.V`).
-fn is_named(channel: &ChannelDescription, name: &str) -> bool {
-    let own = channel.name.to_string();
-    let [layer, last] = [own.split('.').next(), own.rsplit('.').next()];
-    [layer, last].into_iter().flatten().any(|part| part.eq_ignore_ascii_case(name))
-}
-
-/// Returns the channels G and B beside a channel R, which is no depth if they differ from it; empty unless all are there.
-fn find_colors_beside(header: &Header, found: usize) -> Vec<usize> {
-    let channels = &header.channels.list;
-    let own = channels[found].name.to_string();
-    if !own.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case("R")) {
-        return Vec::new();
+/// Places the numbers of the data window in the display window, the frame that all layers and renderings of a scene share:
+/// beyond the data they are unknown, and what lies outside of the frame (overscan) is left out.
+fn place_in_display(header: &Header, numbers: Vec<f32>) -> Result<((u32, u32), Vec<f32>), PictureFault> {
+    let (data, position) = (header.layer_size, header.own_attributes.layer_position);
+    let display = header.shared_attributes.display_window;
+    let [width, height] = [display.size.0, display.size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    check_size(width, height)?;
+    let first = [position.0, position.1].map(i64::from);
+    let origin = [display.position.0, display.position.1].map(i64::from);
+    let [left, top] = [first[0] - origin[0], first[1] - origin[1]];
+    let size = (width, height);
+    if (data, [left, top]) == (display.size, [0, 0]) {
+        return Ok((size, numbers));
     }
-    let beside = |name: &str| {
-        // `own` ends with `R`.
-        let other = format!("{}{name}", &own[..own.len() - 1]);
-        channels.iter().position(|channel| channel.name.to_string().eq_ignore_ascii_case(&other))
-    };
-    [beside("G"), beside("B")].into_iter().collect::<Option<_>>().unwrap_or_default()
+    let mut placed = vec![f32::NAN; width as usize * height as usize];
+    let columns = left.max(0)..(left + data.0 as i64).min(i64::from(width));
+    for (row, stored) in (top..).zip(numbers.chunks_exact(data.0)) {
+        if (0..i64::from(height)).contains(&row) && !columns.is_empty() {
+            let from = (row * i64::from(width) + columns.start) as usize;
+            let count = (columns.end - columns.start) as usize;
+            placed[from..from + count].copy_from_slice(&stored[(columns.start - left) as usize..][..count]);
+        }
+    }
+    Ok((size, placed))
+}
+
+/// The layer and the channel with depth, and channels that must be equal to it.
+struct Choice {
+    layer: usize,
+    channels: Vec<usize>,
+    note: Option<String>,
+}
+
+/// Chooses by meaning: a scalar whose name or layer says depth, above all the standard's `Z` and then the plainest name;
+/// else a scalar that is grey, or else colours, which are depth if they are equal. A channel with others of its vector (the
+/// z of a normal) is no scalar.
+fn choose(headers: &[Header]) -> Option<Choice> {
+    let candidates = headers.iter().enumerate().filter(|(_, header)| !header.deep).flat_map(|(layer, header)| {
+        let channels = &header.channels.list;
+        channels.iter().enumerate().filter_map(move |(at, channel)| {
+            let name = channel.name.to_string();
+            let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
+            let beside = |letter: &str| {
+                let other = if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
+                channels.iter().position(|channel| channel.name.to_string().eq_ignore_ascii_case(&other))
+            };
+            let letter = last.to_ascii_uppercase();
+            let part = header.own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
+            let role = match Role::of_name(&format!("{part} {prefix}")) {
+                Role::Unstated => Role::of_name(last),
+                stated => stated,
+            };
+            let all = |letters: &[&str]| letters.iter().map(|letter| beside(letter)).collect::<Option<Vec<_>>>();
+            let (is_scalar, others) = match &*letter {
+                "X" | "Y" | "Z" => (all(&["X", "Y"]).is_none(), Vec::new()),
+                "R" => (true, all(&["G", "B"]).unwrap_or_default()),
+                "G" | "B" | "A" => (false, Vec::new()),
+                _ => (true, Vec::new()),
+            };
+            let is_usual = ["Z", "V", "Y", "R", "X"].contains(&&*letter);
+            let rank = match role {
+                Role::Depth if prefix.is_empty() && part.is_empty() && letter == "Z" => 0,
+                Role::Depth => 1 + Role::count_other_words(prefix).min(7),
+                Role::Unstated if is_usual => 8 + usize::from(letter == "R"),
+                _ => return None,
+            };
+            is_scalar.then(|| (rank, layer, [vec![at], others].concat(), format!("{part} {name}").trim().to_owned()))
+        })
+    });
+    let mut candidates: Vec<_> = candidates.collect();
+    // Stable: of equals, the first.
+    candidates.sort_by_key(|(rank, ..)| *rank);
+    let equals = candidates.iter().filter(|(rank, ..)| *rank == candidates[0].0).count();
+    let (_, layer, channels, name) = candidates.into_iter().next()?;
+    let note =
+        (equals > 1).then(|| format!("has {equals} layers that may be the depth, of which {name} is taken, the first"));
+    Some(Choice { layer, channels, note })
 }
 
 /// Reads the samples of a line as floats.

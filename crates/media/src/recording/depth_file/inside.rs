@@ -87,7 +87,7 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
 /// Returns, in words, that it is damaged, or has the view of neither the photo nor the map (columns, rows).
 fn decode_original(bytes: &[u8], orientation: Orientation, views: [(u32, u32); 2]) -> Result<ColorImage, String> {
     let mut original = ColorImage::default();
-    let decode = |into| decode::decode_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), into);
+    let decode = |into| decode::decode_stored_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), into);
     let mut metadata: PhotoMetadata = decode(&mut original).map_err(|fault: PictureFault| fault.to_string())?;
     let own = metadata.take_orientation();
     let original = upright(if own == Orientation::NoTransforms { orientation } else { own }).transform_color(original);

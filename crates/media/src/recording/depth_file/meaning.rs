@@ -3,6 +3,7 @@
 use super::values::{Samples, Values};
 use super::{DepthFile, DepthUnit, Distances, Options};
 use crate::recording::fault::PictureFault;
+use crate::recording::role::Role;
 use crate::recording::tum;
 use crate::recording::unit::MapUnit;
 use bokehcam::frame::{DepthMap, DisparityMap};
@@ -41,7 +42,8 @@ impl Meaning {
     /// It is not stated, and they may be distances or nearness.
     pub fn decide(values: &Values, options: &Options) -> Result<Self, PictureFault> {
         let mut notes = Vec::new();
-        let unit = options.unit.or(options.invert.then_some(DepthUnit::Inverse));
+        let is_inverse = options.invert || options.unit.is_none() && values.role == Role::InverseDepth;
+        let unit = options.unit.or(is_inverse.then_some(DepthUnit::Inverse));
         let without_scale = |notes: &mut Vec<String>, what: &str| {
             if options.scale.is_some() {
                 notes.push(format!("{what}; --depth-scale does not apply to it"));
@@ -96,10 +98,10 @@ impl Meaning {
 
     /// Converts the numbers to depth.
     pub fn into_depth(self, values: Values, options: &Options) -> DepthFile {
-        let range = options.range.or_else(|| self.range_of(&values.numbers, options));
-        let is_known = self.known(options);
+        let range = options.range.or_else(|| self.range_of(&values, options));
+        let is_known = self.known(options.invalid.or(values.invalid));
         let Self { quantity, distances, mut notes } = self;
-        notes.splice(..0, values.note);
+        notes.splice(..0, values.notes);
         let (width, height) = values.size;
         let mut numbers = values.numbers;
         let map = match quantity {
@@ -139,17 +141,17 @@ impl Meaning {
     }
 
     /// Returns the test of whether a number is known.
-    fn known(&self, options: &Options) -> impl Fn(f32) -> bool + use<> {
+    fn known(&self, invalid: Option<f32>) -> impl Fn(f32) -> bool + use<> {
         let is_inverse = self.quantity == Quantity::Inverse;
         // In inverse depth 0 is the farthest, unless it is said to be unknown.
-        let invalid = options.invalid.filter(|&invalid| !is_inverse || invalid != 0.0);
+        let invalid = invalid.filter(|&invalid| !is_inverse || invalid != 0.0);
         move |number| Some(number) != invalid && (number.is_finite() || !is_inverse)
     }
 
     /// Returns the numbers of relative depth between which it lies; `None` for depth in metres.
-    pub fn range_of(&self, numbers: &[f32], options: &Options) -> Option<(f32, f32)> {
-        let is_known = self.known(options);
-        let known = || numbers.iter().copied().filter(|&number| is_known(number));
+    pub fn range_of(&self, values: &Values, options: &Options) -> Option<(f32, f32)> {
+        let is_known = self.known(options.invalid.or(values.invalid));
+        let known = || values.numbers.iter().copied().filter(|&number| is_known(number));
         match self.quantity {
             Quantity::Inverse => Some(range_of(known())),
             Quantity::Disparity { rig: None, .. } => {

@@ -7,6 +7,7 @@ mod fit;
 mod inside;
 mod meaning;
 mod npy;
+mod stated;
 mod tiff;
 mod unit;
 mod values;
@@ -17,12 +18,13 @@ use std::path::Path;
 
 pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, read_inside};
+pub(super) use stated::scale_beside;
 pub use unit::DepthUnit;
+pub(crate) use values::has_colors;
 
-use super::coded::{self, EncodedPicture};
+use super::coded::EncodedPicture;
 use super::decoders::guard;
 use super::fault::{PictureFault, open_fault};
-use super::unit::{KEYWORD, MapUnit};
 use super::{MAX_PIXELS, RecordingError, pfm};
 use crate::files::input;
 use bokehcam::frame::{DepthMap, DisparityMap};
@@ -31,10 +33,10 @@ use meaning::Meaning;
 use values::Values;
 
 /// File formats of depth maps, for messages.
-const FORMATS: &str = "PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR";
+const FORMATS: &str = "PNG, JPEG, TIFF, PFM, PGM, NPY, NPZ or EXR";
 
 /// Extensions of the files of depth maps. The first is that of snapshots.
-pub const EXTENSIONS: [&str; 10] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp"];
+pub const EXTENSIONS: [&str; 11] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp", "pgm"];
 
 /// Largest file of floats: 8 bytes per pixel, and room for a header.
 const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
@@ -110,23 +112,22 @@ pub(super) fn read_unfitted(path: &Path, options: &Options) -> Result<DepthFile,
     Ok(Meaning::decide(&values, options)?.into_depth(values, options))
 }
 
-/// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth.
+/// Reads the numbers of a map, also from the colours of a known colour map if they are said to be inverse depth, with
+/// what its name and its neighbours say of them.
 fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
     let colored = match read_numbers(path) {
         Err(PictureFault::ColoredDepth) if matches!(options.unit, None | Some(DepthUnit::Inverse)) => {
             color_map::read(path)?
         }
-        read => return read,
+        read => return read.map(|values| stated::complete(values, path, options)),
     };
-    let ColorMapped { values, name, ends: [near, far] } = colored;
-    match options.unit.is_some() || options.invert {
-        true => {
-            let near = if options.invert { far } else { near };
-            let note = Some(format!("has the colours of {name}, of which {near} is taken as near"));
-            Ok(Values { note, ..values })
-        }
-        false => Err(PictureFault::ColorMapped { name, ends: Box::new([near, far]) }),
+    let ColorMapped { mut values, name, ends: [near, far] } = colored;
+    if options.unit.is_none() && !options.invert {
+        return Err(PictureFault::ColorMapped { name, ends: Box::new([near, far]) });
     }
+    let near = if options.invert { far } else { near };
+    values.notes.push(format!("has the colours of {name}, of which {near} is taken as near"));
+    Ok(values)
 }
 
 /// Reads a map; the first bytes decide its format.
@@ -172,20 +173,13 @@ fn read_codes(path: &Path) -> Result<Values, PictureFault> {
         fault => fault,
     })?;
     let (values, mut metadata) = values::decode_codes(coded)?;
-    Ok(Values { stated: read_stated_unit(path), ..values }.turned(metadata.take_orientation()))
-}
-
-/// Reads the unit that a PNG of ours states.
-fn read_stated_unit(path: &Path) -> Option<MapUnit> {
-    let info = coded::read_png_info(path).ok()?;
-    let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD)?;
-    MapUnit::from_text(&chunk.text)
+    Ok(Values { stated: stated::read_text(path), ..values }.turned(metadata.take_orientation()))
 }
 
 /// Reads the range of the numbers of relative depth, for [`Options::range`]; `None` if the map has metres.
 pub(super) fn read_range(path: &Path, options: &Options) -> Result<Option<(f32, f32)>, PictureFault> {
     let values = read_values(path, options)?;
-    Ok(Meaning::decide(&values, options)?.range_of(&values.numbers, options))
+    Ok(Meaning::decide(&values, options)?.range_of(&values, options))
 }
 
 /// Reads a map of disparities in pixels, 0 = unknown: whole numbers of 16 bits are 1/256 px.

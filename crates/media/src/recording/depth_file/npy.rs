@@ -12,6 +12,7 @@ use zip::result::ZipError;
 use super::values::{Samples, Values};
 use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
+use crate::recording::role::Role;
 
 /// Longest header that is read; those of arrays without named fields have 128 bytes.
 const MAX_HEADER_BYTES: usize = 1 << 16;
@@ -19,10 +20,10 @@ const MAX_HEADER_BYTES: usize = 1 << 16;
 const MAX_ARRAYS: usize = 64;
 /// Largest side of an array that is a camera's matrix or pose rather than a map, if there is another.
 const MAX_MATRIX_SIDE: usize = 4;
-/// Usual names of the map among several arrays, in order of preference.
-const NAMES: [&str; 6] = ["depth", "depth_map", "depths", "prediction", "pred", "disparity"];
+/// Names of the map among several arrays that do not say what it is.
+const PREDICTIONS: [&str; 2] = ["prediction", "pred"];
 
-/// Parses an array of two dimensions; further ones of length 1 are ignored.
+/// Parses an array of two dimensions; further ones of length 1, and equal channels, are ignored.
 pub(super) fn parse(file: &[u8]) -> Result<Values, PictureFault> {
     let (header, data) = Header::split(file)?;
     header.read(data)
@@ -77,6 +78,10 @@ impl Header {
         let shape = match (sides.len(), of_map.as_slice()) {
             (2, _) => [sides[0], sides[1]],
             (3.., &[rows, columns]) => [rows, columns],
+            (3, &[maps, rows, columns]) if columns > MAX_MATRIX_SIDE => {
+                let of = format!("an array of {maps} maps of {columns}x{rows}, as of a video,");
+                return Err(PictureFault::NotAMap(of));
+            }
             _ => return Err(PictureFault::NotAMap(format!("an array of shape ({})", shape.trim()))),
         };
         let (kind, bytes) = match descr.trim_start_matches(['<', '>', '|', '=']) {
@@ -89,6 +94,7 @@ impl Header {
             "i2" => (b'i', 2),
             "i4" => (b'i', 4),
             "i8" => (b'i', 8),
+            "u8" => (b'u', 8),
             _ => return Err(PictureFault::NotAMap(format!("an array of type {descr:?}"))),
         };
         Ok(Self { shape, is_column_major, is_big_endian: descr.starts_with('>'), kind, bytes })
@@ -153,15 +159,19 @@ pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, Picture
             header => {
                 let is_matrix =
                     header.is_ok_and(|(header, _)| header.shape.iter().all(|&side| side <= MAX_MATRIX_SIDE));
-                let rank = NAMES.iter().position(|known| stem.eq_ignore_ascii_case(known)).unwrap_or(NAMES.len());
+                let is_prediction = PREDICTIONS.iter().any(|known| stem.eq_ignore_ascii_case(known));
+                let rank = (Role::of_name(&stem), !is_prediction, Role::count_other_words(&stem));
                 maps.push((rank, is_matrix, index, stem));
             }
         }
     }
     maps.sort_unstable();
-    let Some((rank, _, index, stem)) = maps.first() else {
+    let Some(((role, is_unnamed, _), _, index, stem)) = maps.first() else {
         return Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())));
     };
+    if *role == Role::Other {
+        return Err(PictureFault::NotAMap(format!("an archive of {stem:?}, without an array of depth,")));
+    }
     let member = archive.by_index(*index).map_err(zip_fault)?;
     if member.size() > max_bytes {
         return Err(PictureFault::FileSize { bytes: member.size(), max_bytes });
@@ -169,13 +179,13 @@ pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, Picture
     let mut array = Vec::new();
     read_member(member, max_bytes, &mut array)?;
     let others = maps.iter().filter(|(_, is_matrix, ..)| !is_matrix).count();
-    let note = (*rank == NAMES.len() && others > 1).then(|| {
+    let note = (*role == Role::Unstated && *is_unnamed && others > 1).then(|| {
         format!(
             "has {others} arrays that may be the map, of which {stem:?} is taken, the first; one of the name \"depth\" \
              has priority"
         )
     });
-    Ok(Values { note, ..parse(&array)? })
+    Ok(Values { notes: note.into_iter().collect(), role: *role, ..parse(&array)? })
 }
 
 /// Reads the beginning of a file in an archive.

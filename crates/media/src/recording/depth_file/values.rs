@@ -5,6 +5,7 @@ use image::metadata::Orientation;
 use crate::recording::coded::EncodedPicture;
 use crate::recording::fault::PictureFault;
 use crate::recording::photo_metadata::PhotoMetadata;
+use crate::recording::role::Role;
 use crate::recording::unit::{self, MapUnit};
 use crate::recording::upright::upright;
 
@@ -19,8 +20,12 @@ pub(super) struct Values {
     pub samples: Samples,
     /// The unit that the file states.
     pub stated: Option<MapUnit>,
-    /// What was assumed to find them in the file.
-    pub note: Option<String>,
+    /// What the name says that they are, of their array or else of their file.
+    pub role: Role,
+    /// A number that means unknown, as what stands beside the file states.
+    pub invalid: Option<f32>,
+    /// What was assumed about them, a line each.
+    pub notes: Vec<String>,
 }
 
 /// The kind of numbers in a file.
@@ -121,4 +126,11 @@ impl ColorCount {
         let is_colored = self.count as f32 > Self::MAX_SHARE * pixels as f32;
         if is_colored { Err(PictureFault::ColoredDepth) } else { Ok(()) }
     }
+}
+
+/// Returns whether pixels of 8-bit RGB are in colours, so that they are no depth.
+pub(crate) fn has_colors(rgb: &[u8]) -> bool {
+    let mut colors = ColorCount::new(Samples::Eight.white());
+    rgb.as_chunks::<3>().0.iter().for_each(|rgb| colors.add(rgb.map(f32::from)));
+    colors.check(rgb.len() / 3).is_err()
 }

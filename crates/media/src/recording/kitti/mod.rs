@@ -1,6 +1,6 @@
 //! The layouts of the KITTI benchmarks, odometry (one sequence) and stereo, and their derivatives: a folder per camera,
-//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line; or single
-//! scenes, each with its calibration.
+//! whose pictures are numbered and named alike in both, `calib.txt`, and `times.txt` with one time per line; raw drives,
+//! with `timestamps.txt` and the calibration of their day; or single scenes, each with its calibration.
 
 pub(super) mod calib;
 mod scenes;
@@ -83,19 +83,23 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         false => (names, None),
     };
     let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", folders.left))));
-    let mut entries = times::timed_entries(dir, pictures.collect(), options)?;
+    let list = times::find_list(dir, folders.left);
+    let mut entries = times::timed_entries(dir, list.as_deref(), pictures.collect(), options)?;
     clear_unordered_times(entries.iter_mut());
     if !options.keep_going {
         refuse_faults(dir, entries.iter())?;
     }
     let frames = entries.into_iter().zip(&names).map(|(left, name)| ListedFrame {
         time_ns: left.time_ns,
-        // `times.txt` does not name pictures: its line is cited only if the time itself is faulty.
+        // The list of times does not name pictures: its line is cited only if the time itself is faulty.
         color: PictureSource { position: left.source.position.filter(|_| left.source.file.is_err()), ..left.source },
         right: Some(PictureSource::from_path(Path::new(folders.right).join(name))),
         depth: None,
     });
+    // All drives of a day share one, in the folder of the day.
+    let day = dir.join("..").join(CALIBRATIONS[1]);
     let calibration = CALIBRATIONS.iter().map(|name| dir.join(name)).find(|path| path.exists());
+    let calibration = calibration.or_else(|| Some(day).filter(|file| folders.left.contains('/') && file.exists()));
     let rig = match calibration.filter(|_| scenes_rig.is_none()) {
         Some(path) => Some(Geometry::read_with(&path, |text| calib::parse(text, folders.camera))?.rig),
         None => scenes_rig,
@@ -105,7 +109,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         stereo_geometry: Some(rig.map_or(StereoGeometry::Uncalibrated, StereoGeometry::Rectified)),
         is_chosen_by_size,
         unpaired: Unpaired { right: right_alone.len(), ..Unpaired::default() },
-        has_times: dir.join(times::LIST).exists(),
+        has_times: list.is_some(),
         ..Contents::default()
     })
 }

@@ -1,4 +1,5 @@
-//! Times of the pictures: `times.txt`, with one time in seconds per line, beginning with picture 0.
+//! Times of the pictures, one per line, beginning with picture 0: `times.txt` in seconds (odometry), or `timestamps.txt`
+//! beside the pictures with dates (raw drives).
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,8 @@ use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quote};
 use crate::recording::timeline::given_period_ns;
 
-pub(super) const LIST: &str = "times.txt";
+const LIST: &str = "times.txt";
+const DATED_LIST: &str = "timestamps.txt";
 
 /// Period without a list of times: 10 frames per second, the trigger rate of KITTI's cameras.
 const PERIOD_NS: u64 = 100_000_000;
@@ -17,35 +19,69 @@ const PERIOD_NS: u64 = 100_000_000;
 /// Upper bound of a valid time in seconds: beyond any date.
 const LAST_S: f64 = 1e10;
 
+/// Returns the list of times of the pictures in the folder `left` of `dir`, relative to `dir`, if there is one.
+pub(super) fn find_list(dir: &Path, left: &str) -> Option<String> {
+    let dated = left.strip_suffix("/data").map(|camera| format!("{camera}/{DATED_LIST}"));
+    [Some(LIST.to_owned()), dated].into_iter().flatten().find(|list| dir.join(list).exists())
+}
+
 /// Returns entries with times for `pictures` (name, file). A picture named by the number n has the time in line n (from
-/// 0) of `times.txt`, so that an excerpt may keep the full list; other names count by position. Without the list, the
+/// 0) of `list`, so that an excerpt may keep the full list; other names count by position. Without a list, the
 /// pictures are [`Options::period_ns`] apart, else [`PERIOD_NS`].
 ///
 /// # Errors
 /// A picture has no time, and `keep_going` is not set.
-pub(super) fn timed_entries(dir: &Path, pictures: Vec<(&str, PathBuf)>, options: &Options) -> Result<Vec<Entry>> {
-    if !dir.join(LIST).exists() {
+pub(super) fn timed_entries(
+    dir: &Path,
+    list: Option<&str>,
+    pictures: Vec<(&str, PathBuf)>,
+    options: &Options,
+) -> Result<Vec<Entry>> {
+    let Some(list) = list else {
         let period_ns = given_period_ns(options).unwrap_or(PERIOD_NS);
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
             time_ns: Some(index * period_ns),
             source: PictureSource::from_path(file),
         };
         return Ok((0..).zip(pictures).map(entry).collect());
-    }
-    let times = list::read_list(dir, LIST, |position, text| (position, text.and_then(parse_ns)))?;
+    };
+    let parse = if list == LIST { parse_ns } else { parse_date_ns };
+    let times = list::read_list(dir, list, |position, text| (position, text.and_then(parse)))?;
     let entries = pictures.into_iter().enumerate().map(|(index, (name, file))| {
         let number = name.split('.').next().and_then(|stem| stem.parse().ok()).unwrap_or(index);
         match times.get(number) {
             Some((position, time_ns)) => Ok(Entry::new(position.clone(), time_ns.clone(), Ok(file))),
             None if options.keep_going => Ok(Entry { time_ns: None, source: PictureSource::from_path(file) }),
             None => Err(RecordingError::TooFewTimes {
-                list: dir.join(LIST),
+                list: dir.join(list),
                 times: times.len(),
                 picture: file.display().to_string(),
             }),
         }
     });
     entries.collect()
+}
+
+/// Parses a date and time such as `2011-09-26 13:02:25.964389445` to nanoseconds after 1970.
+fn parse_date_ns(text: &str) -> Result<u64, LineFault> {
+    let parse = || {
+        let (date, time) = text.trim().split_once([' ', 'T'])?;
+        let whole = |text: &str| text.parse::<u64>().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()));
+        let mut date = date.splitn(3, '-').map(whole);
+        let [year, month, day] = [date.next()??, date.next()??, date.next()??];
+        let mut clock = time.splitn(3, ':');
+        let [hours, minutes] = [whole(clock.next()?)?, whole(clock.next()?)?];
+        let seconds: f64 = clock.next()?.parse().ok().filter(|seconds| (0.0..61.0).contains(seconds))?;
+        let is_valid = (1970..2200).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&day);
+        if !is_valid || hours > 23 || minutes > 59 {
+            return None;
+        }
+        // Years that begin in March end with the day that leap years add.
+        let (year, month) = if month < 3 { (year - 1, month + 9) } else { (year, month - 3) };
+        let days = 365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day - 1 - 719_468;
+        Some(((days * 24 + hours) * 60 + minutes) * 60_000_000_000 + (seconds * 1e9).round() as u64)
+    };
+    parse().ok_or_else(|| LineFault::Date(quote(text)))
 }
 
 /// Parses seconds >= 0, with or without an exponent (KITTI writes `1.037359e-01`), to nanoseconds. `f64` is precise
@@ -58,6 +94,21 @@ fn parse_ns(text: &str) -> Result<u64, LineFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dates_are_nanoseconds_after_1970() {
+        for (text, ns) in [
+            ("1970-01-01 00:00:00.000000001", 1),
+            ("2000-03-01 00:00:00", 951_868_800_000_000_000),
+            ("2011-09-26 13:02:25.964389445", 1_317_042_145_964_389_445),
+            ("2012-02-29 23:59:59.5", 1_330_559_999_500_000_000),
+        ] {
+            assert_eq!(parse_date_ns(text), Ok(ns));
+        }
+        for text in ["", "2011-09-26", "2011-13-26 00:00:00", "2011-09-26 24:00:00", "1.5", "2011-09-26 1:1:-1"] {
+            assert_eq!(parse_date_ns(text), Err(LineFault::Date(text.into())));
+        }
+    }
 
     #[test]
     fn times_are_seconds_in_any_writing() {

@@ -1,7 +1,9 @@
 //! A folder of pictures without lists, in natural order of their names, or those of a pattern such as
-//! `DIR/IMG_%04d.jpg`. Depth maps may be beside them: named `NAME-depth` or `NAME.depth`, in a folder `depth` or
-//! `depths` within or beside the folder, or in `DIR-depth`. Masks beside them (`NAME-mask`) are left out.
+//! `DIR/IMG_%04d.jpg`. Depth maps may be beside them: named `NAME-depth`, `NAME.depth` or `NAME_depth`, or `NAME` with
+//! another ending and grey of 16 bits; in a folder `depth` or `depths` within or beside the folder, or in `DIR-depth`.
+//! Masks (`NAME-mask`) and what else belongs to pictures is left out.
 
+mod companions;
 mod pattern;
 
 use std::collections::HashSet;
@@ -13,6 +15,8 @@ use super::fault::PictureFault;
 use super::folder::{Pictures, find_pictures, has_pictures};
 use super::rgbd::{self, Scale};
 use super::{Options, decode, mask_file, timeline};
+pub use companions::{MAP_SUFFIXES, is_companion};
+pub(super) use companions::{has_picture_of, is_map};
 use pattern::Pattern;
 
 /// Any folder with pictures: the last layout to try.
@@ -23,26 +27,25 @@ pub(super) const LAYOUT: Layout = Layout {
     open: |folder, options| from_names(folder, find_photos(&folder.dir)?, options),
 };
 
-/// Suffixes of depth maps in the folder of the pictures.
-pub(super) const MAP_SUFFIXES: [&str; 2] = ["-depth", ".depth"];
-
-fn is_map(stem: &str) -> bool {
-    MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
-}
-
-/// Returns the names of the pictures in `dir` without depth maps, and without the masks of pictures that are there.
+/// Returns the names of the pictures in `dir` without depth maps, and what else belongs to pictures that are there.
 fn find_photos(dir: &Path) -> Result<Vec<String>> {
     let names = find_pictures(dir, |stem| !is_map(stem))?;
     let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
     let stems: HashSet<String> = names.iter().map(|name| stem(name)).collect();
     let is_mask = |name: &String| mask_file::picture_stem(&stem(name)).is_some_and(|photo| stems.contains(photo));
-    let (masks, photos): (Vec<String>, Vec<String>) = names.into_iter().partition(is_mask);
+    let count = names.len();
+    let (masks, mut photos): (Vec<String>, Vec<String>) = names.into_iter().partition(is_mask);
+    let all = photos.clone();
+    photos.retain(|name| !is_companion(&dir.join(name)));
+    // Grey pictures alone are what there is to play.
+    let photos = if photos.is_empty() { all } else { photos };
+    let dir = dir.display();
     if !masks.is_empty() {
-        tracing::warn!(
-            "{}: {} masks of pictures are left out: they are for `render --mask`",
-            dir.display(),
-            masks.len()
-        );
+        tracing::warn!("{dir}: {} masks of pictures are left out: they are for `render --mask`", masks.len());
+    }
+    let others = count - masks.len() - photos.len();
+    if others > 0 {
+        tracing::warn!("{dir}: {others} grey pictures that belong to others by their names are not played as pictures");
     }
     Ok(photos)
 }
@@ -89,9 +92,16 @@ fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -
     let pictures = Pictures::all_in(Path::new(""));
     if let Some((maps_dir, suffix)) = find_maps(dir) {
         let maps = Pictures { suffix, ..pictures };
+        let map_names = match maps_dir == *dir && suffix.is_empty() {
+            true => companions::find_twin_maps(dir),
+            false => maps.find_in(&maps_dir)?,
+        };
         let maps_root = maps_dir.canonicalize().map_err(RecordingError::io("open the depth maps", &maps_dir))?;
         let maps_dir = if maps_dir == *dir { dir } else { &maps_root };
-        return match rgbd::from_pairs(dir, (pictures, names.clone()), (maps_dir, maps), Scale::Millimetres, options) {
+        return match {
+            let scale = Scale::of_folder(dir, pictures.folder);
+            rgbd::from_pairs(dir, (pictures, names.clone()), (maps_dir, maps, map_names), scale, options)
+        } {
             Err(error @ RecordingError::NoNumberPairs { .. }) => {
                 tracing::warn!("{error}; the pictures are used without depth");
                 Ok(without_depth(dir, names, options))
@@ -118,6 +128,9 @@ fn without_depth(dir: &Path, names: Vec<String>, options: &Options) -> Contents 
 fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
     if let Some(suffix) = MAP_SUFFIXES.into_iter().find(|suffix| has_pictures(dir, |stem| stem.ends_with(suffix))) {
         return Some((dir.to_owned(), suffix));
+    }
+    if !companions::find_twin_maps(dir).is_empty() {
+        return Some((dir.to_owned(), ""));
     }
     let absolute = std::path::absolute(dir).ok()?;
     let (name, parent) = (absolute.file_name()?.to_str()?, absolute.parent()?);

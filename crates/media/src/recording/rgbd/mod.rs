@@ -1,7 +1,8 @@
 //! Folders of colour pictures and depth maps without lists, paired by name or number: `color` and `depth` (ScanNet,
 //! Open3D), `rgb` and `depth` with `scene_camera.json` (BOP), `results/frame000000.jpg` and `results/depth000000.png`
 //! with `cam_params.json` (Replica, as NICE-SLAM renders it), `frame-000000.color.png` and `frame-000000.depth.png`
-//! (7-Scenes), `left000000.png` and `depth000000.png` (ZED's export), and `rgb.mp4` and `depth` (Stray Scanner).
+//! (7-Scenes), `left000000.png` and `depth000000.png` (ZED's export), `frame_00000.jpg` and `depth_00000.png` (3D Scanner
+//! App), and `rgb.mp4` and `depth` (Stray Scanner).
 
 mod scale;
 
@@ -10,7 +11,7 @@ use std::path::Path;
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
-use super::folder::{PairKey, Pictures, pair_by_name};
+use super::folder::{Pictures, pair_by_name};
 use super::{DepthUnit, Options, Unpaired, timeline};
 use crate::files::folder::has_file_list;
 pub(super) use scale::Scale;
@@ -32,10 +33,11 @@ pub(super) const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
 const FILM: &str = "rgb.mp4";
 
 /// Pairs of pictures that share a folder: its name, then prefix and suffix of colour and of depth.
-const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 3] = [
+const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 4] = [
     ("results", [("frame", ""), ("depth", "")]),
     ("", [("frame-", ".color"), ("frame-", ".depth")]),
     ("", [("left", ""), ("depth", "")]),
+    ("", [("frame_", ""), ("depth_", "")]),
 ];
 
 /// Returns the kinds of the colour pictures and depth maps in `dir`, if it has both.
@@ -57,22 +59,22 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let dir = &folder.dir;
     let Some([color, depth]) = find_pair(dir) else { return Err(RecordingError::Film { dir: dir.clone() }) };
     let names = color.find_in(dir)?;
-    from_pairs(dir, (color, names), (dir, depth), Scale::of_folder(dir, color.folder), options)
+    let maps = depth.find_in(dir)?;
+    from_pairs(dir, (color, names), (dir, depth, maps), Scale::of_folder(dir, color.folder), options)
 }
 
-/// Creates the contents from the pictures `names` in `dir` and the depth maps `depth` in `maps_dir`, which have `scale`
-/// unless the options have another.
+/// Creates the contents from the pictures `names` in `dir` and the depth maps `maps` in `maps_dir`, which have `scale` unless
+/// the options have another.
 ///
 /// # Errors
-/// The folder of maps cannot be listed, two pictures have the same number, none pairs, or the scale's file is faulty.
+/// Two pictures have the same number, none pairs, or the scale's file is faulty.
 pub(super) fn from_pairs(
     dir: &Path,
     (color, names): (Pictures, Vec<String>),
-    (maps_dir, depth): (&Path, Pictures),
+    (maps_dir, depth, maps): (&Path, Pictures, Vec<String>),
     scale: Scale,
     options: &Options,
 ) -> Result<Contents, RecordingError> {
-    let maps = depth.find_in(maps_dir)?;
     let counts = [names.len(), maps.len()];
     let (pairs, by) = pair_by_name(dir, (color, names), (depth, maps))?;
     if pairs.is_empty() {
@@ -81,9 +83,9 @@ pub(super) fn from_pairs(
         return Err(RecordingError::NoNumberPairs { dir: dir.to_owned(), color, depth });
     }
     let (format, unit) = depth_format(scale, options)?;
-    let by = if by == PairKey::Name { "name" } else { "number" };
+    let by = by.describe();
     let rate = timeline::describe_rate(options);
-    tracing::warn!("{}: {} pairs of colour and depth by {by}, {rate}; {unit}", dir.display(), pairs.len());
+    tracing::warn!("{}: {} pairs of colour and depth by their {by}, {rate}; {unit}", dir.display(), pairs.len());
     let unpaired = Unpaired { color: counts[0] - pairs.len(), depth: counts[1] - pairs.len(), ..Unpaired::default() };
     if unpaired != Unpaired::default() {
         let Unpaired { color, depth, .. } = unpaired;

@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::{LAYOUT, find_pair};
 use crate::files::input;
 use crate::recording::error::RecordingError;
+use crate::recording::{LAYOUTS, pictures};
 
 /// Units per metre of Replica, as NICE-SLAM and iMAP render it: 65535 is 10 m.
 const REPLICA_SCALE: f32 = 6553.5;
@@ -24,14 +26,22 @@ pub(in crate::recording) enum Scale {
     Replica(Option<PathBuf>),
     /// BOP's `scene_camera.json`: millimetres per unit as `depth_scale` of each picture.
     Bop(PathBuf),
+    /// `transforms.json` of Nerfstudio, SplaTAM and Instant NGP: metres per unit.
+    Transforms(PathBuf),
 }
 
 /// Units as stated by a data set.
-pub(super) struct StatedUnits {
-    pub(super) per_m: f32,
-    pub(super) invalid: Option<u16>,
+pub(in crate::recording) struct StatedUnits {
+    pub(in crate::recording) per_m: f32,
+    pub(in crate::recording) invalid: Option<u16>,
     /// What states them, for messages.
-    pub(super) origin: String,
+    pub(in crate::recording) origin: String,
+}
+
+impl StatedUnits {
+    fn millimetres(origin: &str) -> Self {
+        Self { per_m: 1000.0, invalid: Some(u16::MAX), origin: origin.to_owned() }
+    }
 }
 
 #[derive(Deserialize)]
@@ -44,6 +54,19 @@ struct ReplicaCamera {
     scale: f64,
 }
 
+/// The scales of Instant NGP and SplaTAM, and of Nerfstudio.
+#[derive(Deserialize)]
+struct Transforms {
+    integer_depth_scale: Option<f64>,
+    depth_unit_scale_factor: Option<f64>,
+}
+
+impl Transforms {
+    fn metres(&self) -> Option<f64> {
+        self.integer_depth_scale.or(self.depth_unit_scale_factor)
+    }
+}
+
 #[derive(Deserialize)]
 struct BopCamera {
     depth_scale: f64,
@@ -51,10 +74,13 @@ struct BopCamera {
 
 impl Scale {
     /// Returns the origin of the units in the recording `dir`, whose colour pictures are in `color`.
-    pub(super) fn of_folder(dir: &Path, color: &Path) -> Self {
+    pub(in crate::recording) fn of_folder(dir: &Path, color: &Path) -> Self {
         let file = |dir: &Path, name: &str| Some(dir.join(name)).filter(|file| file.is_file());
         if let Some(file) = file(dir, "scene_camera.json") {
             return Self::Bop(file);
+        }
+        if let Some(file) = file(dir, "transforms.json") {
+            return Self::Transforms(file);
         }
         // One file for all scenes, beside them.
         let beside = std::path::absolute(dir).ok().and_then(|dir| Some(dir.parent()?.to_owned()));
@@ -65,16 +91,34 @@ impl Scale {
         }
     }
 
+    /// Returns the origin of the units of a single map, if it is one of a recording of this kind, or lies beside the picture
+    /// that it is of by its name.
+    pub(in crate::recording) fn of_map(map: &Path) -> Option<Self> {
+        let map = std::path::absolute(map).ok()?;
+        let folder = map.parent()?;
+        if pictures::has_picture_of(&map) {
+            return Some(Self::of_folder(folder, Path::new("")));
+        }
+        [folder.parent(), Some(folder)].into_iter().flatten().find_map(|dir| {
+            // Other layouts, such as lists of both, come before.
+            LAYOUTS.iter().find(|layout| (layout.matches)(dir)).filter(|layout| layout.name == LAYOUT.name)?;
+            let [color, depth] = find_pair(dir)?;
+            let is_of_pair = dir.join(depth.folder) == folder;
+            is_of_pair.then(|| Self::of_folder(dir, color.folder))
+        })
+    }
+
     /// Reads the file, if there is one.
     ///
     /// # Errors
     /// It is unreadable, or states no scale > 0; or that of its pictures differs.
-    pub(super) fn read(&self) -> Result<StatedUnits, RecordingError> {
+    pub(in crate::recording) fn read(&self) -> Result<StatedUnits, RecordingError> {
         match self {
-            Self::Millimetres => {
-                let origin = "assumed to be millimetres, 65535 unknown".to_owned();
-                Ok(StatedUnits { per_m: 1000.0, invalid: Some(u16::MAX), origin })
-            }
+            Self::Millimetres => Ok(StatedUnits::millimetres("assumed to be millimetres, 65535 unknown")),
+            Self::Transforms(file) => match read_json::<Transforms>(file)?.metres() {
+                Some(metres) => to_units(file, 1.0 / metres),
+                None => Ok(StatedUnits::millimetres("assumed to be millimetres, as transforms.json states no scale")),
+            },
             Self::Replica(None) => {
                 let origin = "assumed to be Replica, without cam_params.json".to_owned();
                 Ok(StatedUnits { per_m: REPLICA_SCALE, invalid: None, origin })

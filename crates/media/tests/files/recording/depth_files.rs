@@ -1,6 +1,6 @@
 //! Depth maps of photos, in the formats and units of other tools.
 
-mod encode;
+pub mod encode;
 
 use std::fs;
 use std::io::Write;
@@ -65,7 +65,7 @@ fn floats_of_every_format_are_metres() {
         assert_eq!(read(&path("z.exr"), Options::default()).unwrap().map.metres, DEPTHS_M, "{channel}");
     }
     exr(&path("z.exr"), &[&[("alpha", &DEPTHS_M)]]);
-    assert_says(read(&path("z.exr"), Options::default()), &["z.exr", "without a channel"]);
+    assert_says(read(&path("z.exr"), Options::default()), &["z.exr", "without a layer of depth"]);
 }
 
 #[test]

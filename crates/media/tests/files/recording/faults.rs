@@ -244,7 +244,7 @@ fn damage_is_told() {
     scene.write("rgb/1.png", file);
     assert_color_fault(&scene, "damaged");
     scene.write("rgb/1.png", b"a text rather than a picture");
-    assert_color_fault(&scene, "not a PNG, JPEG, TIFF, WebP, BMP or GIF file");
+    assert_color_fault(&scene, "not a PNG, JPEG, TIFF, WebP, BMP, PNM or GIF file");
 }
 
 #[test]

@@ -28,8 +28,8 @@ fn colour_of_every_kind_becomes_8_bit_rgb() {
         read_color(&path).unwrap()
     };
     let rgb = save(RgbaImage::from_pixel(3, 2, [10, 20, 30, 128].into()).into());
-    assert_eq!((rgb.size(), &rgb.rgb[..3]), ((3, 2), &[10, 20, 30][..]));
-    assert_eq!(save(GrayAlphaImage::from_pixel(3, 2, [77, 5].into()).into()).rgb, [77; 18]);
+    assert_eq!((rgb.size(), &rgb.rgb[..3]), ((3, 2), &[132, 137, 142][..]), "in front of white");
+    assert_eq!(save(GrayAlphaImage::from_pixel(3, 2, [77, 5].into()).into()).rgb, [252; 18]);
     let wide = ImageBuffer::<Luma<u16>, _>::from_pixel(3, 2, [0x8081].into());
     assert_eq!(save(wide.into()).rgb, [0x80; 18]);
     let wide = ImageBuffer::<Rgb<u16>, _>::from_pixel(3, 2, [0, 65535, 300].into());

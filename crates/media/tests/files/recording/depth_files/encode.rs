@@ -123,3 +123,16 @@ pub fn exr(path: &Path, layers: &[&[(&str, &[f32])]]) {
     let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
     Image::from_layers(attributes, layers.collect::<Vec<_>>()).write().to_file(path).unwrap();
 }
+
+/// Writes an EXR of one layer without a name, whose data lie at this place of a display window of these columns and rows.
+pub fn exr_in_window(path: &Path, channels: &[(&str, &[f32])], at: (i32, i32), display: (u32, u32)) {
+    use exr::prelude::*;
+    let size = (SIZE.0 as usize, SIZE.1 as usize);
+    let channel = |(name, values): &(&str, &[f32])| AnyChannel::new(*name, FlatSamples::F32(values.to_vec()));
+    let mut layer = LayerAttributes::default();
+    layer.layer_position = Vec2(at.0, at.1);
+    let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+    let layer = Layer::new(size, layer, Encoding::SMALL_FAST_LOSSLESS, channels);
+    let window = IntegerBounds::from_dimensions((display.0 as usize, display.1 as usize));
+    Image::new(ImageAttributes::new(window), layer).write().to_file(path).unwrap();
+}

@@ -1,0 +1,61 @@
+//! What is said of a map's numbers beside them: in its metadata, by its name, and by its neighbours.
+
+use std::path::Path;
+
+use super::values::{Samples, Values};
+use super::{DepthUnit, Options};
+use crate::recording::coded;
+use crate::recording::geometry::Geometry;
+use crate::recording::middlebury;
+use crate::recording::rgbd::Scale;
+use crate::recording::role::Role;
+use crate::recording::unit::{KEYWORD, MapUnit};
+
+/// Calibration of a pair, beside its disparities.
+const CALIBRATION: &str = "calib.txt";
+
+/// Reads the unit that a PNG of ours states.
+pub(super) fn read_text(path: &Path) -> Option<MapUnit> {
+    let info = coded::read_png_info(path).ok()?;
+    let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD)?;
+    MapUnit::from_text(&chunk.text)
+}
+
+/// Adds what name and neighbours of the file `path` say of numbers of which neither the file nor the options state it.
+pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Values {
+    if values.stated.is_some() || options.unit.is_some_and(|unit| unit != DepthUnit::Disparity) || options.invert {
+        return values;
+    }
+    if values.role == Role::Unstated {
+        values.role = Role::of_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    }
+    let is_disparity = values.role == Role::Disparity || options.unit == Some(DepthUnit::Disparity);
+    if is_disparity {
+        let rig = Some(path.with_file_name(CALIBRATION)).filter(|file| file.is_file()).and_then(|file| {
+            let geometry = Geometry::read_with(&file, middlebury::calib::parse)
+                .and_then(|read| read.scaled_to(&file, values.size));
+            geometry.map_err(|error| values.notes.push(error.to_string())).ok()
+        });
+        let scale = if rig.is_some() { format!(", with the scale of {CALIBRATION} beside it") } else { String::new() };
+        if options.unit.is_none() {
+            values.notes.push(format!("holds disparity by its name{scale}; --depth-unit says what else it is"));
+        }
+        values.stated = Some(MapUnit::Disparity { rig: rig.map(|geometry| geometry.rig) });
+    } else if values.role == Role::InverseDepth {
+        values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
+    } else if let Some((per_m, invalid, note)) =
+        scale_beside(path).filter(|_| values.samples == Samples::Sixteen && options.scale.is_none())
+    {
+        (values.stated, values.invalid) = (Some(MapUnit::Depth { per_m }), invalid);
+        values.notes.push(note);
+    }
+    values
+}
+
+/// Returns the units per metre of 16-bit maps like this one in its recording, the number that means unknown there, and a
+/// sentence about them; `None` if it belongs to none.
+pub(in crate::recording) fn scale_beside(path: &Path) -> Option<(f32, Option<f32>, String)> {
+    let stated = Scale::of_map(path)?.read().ok()?;
+    let note = format!("has {} units per metre ({}; --depth-scale)", stated.per_m, stated.origin);
+    Some((stated.per_m, stated.invalid.map(f32::from), note))
+}
