@@ -46,4 +46,5 @@ mod render;
 mod settings;
 mod stereo;
 mod terminal;
+mod video_meaning;
 mod videos;

@@ -233,7 +233,7 @@ impl Sink for Null {
     }
 }
 
-/// The sound of a video file, which belongs to its pictures.
+/// What belongs to the pictures of a video file: its sound, title, date and place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sound {
     /// The file that has it.

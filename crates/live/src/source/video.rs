@@ -75,6 +75,7 @@ pub(super) fn parse(path: &Path) -> Option<Result<SourceName, SourceError>> {
 /// The file is not a readable video, the range has no frame, or an option does not fit.
 pub(super) fn open(path: &Path, frames: &Frames, by_index: bool) -> Result<Video, SourceError> {
     let file = VideoFile::open(path).map_err(CaptureError::from)?;
+    file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", path.display()));
     let size_px = frames.size.map_or(file.size_px, |size| (size.width, size.height));
     if !has_same_view(size_px, file.size_px) {
         let ((width, height), (from_width, from_height)) = (size_px, file.size_px);
@@ -88,8 +89,8 @@ pub(super) fn open(path: &Path, frames: &Frames, by_index: bool) -> Result<Video
     Ok(Video::open(file, size_px, frames.fps, play_range(frames), !by_index)?)
 }
 
-/// Returns the sound that belongs to the played part of a video file, if it has any; warns if the part has none of its
-/// own.
+/// Returns the sound and the title, date and place of the played part of a video file, if it has any; warns of what is
+/// left out.
 ///
 /// # Errors
 /// The file is unreadable.
@@ -98,8 +99,12 @@ pub fn find_sound(path: &Path, frames: &Frames) -> Result<Option<Sound>, SourceE
     if file.has_sound && frames.repeat {
         tracing::warn!("{}: a loop is written without its sound", path.display());
     }
+    if file.has_subtitles {
+        tracing::warn!("{}: written without its subtitles", path.display());
+    }
     let start_s = frames.start.unwrap_or(0.0) + file.offset_s;
-    Ok((file.has_sound && !frames.repeat).then(|| Sound { path: path.to_owned(), start_s: start_s.max(0.0) }))
+    Ok(((file.has_sound || file.has_tags) && !frames.repeat)
+        .then(|| Sound { path: path.to_owned(), start_s: start_s.max(0.0) }))
 }
 
 /// Opens the depth in the video `file` for the frames of the source `name`, of `color_px`.

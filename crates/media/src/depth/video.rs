@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::recording::depth_covers;
+use crate::recording::depth_file::has_colors;
 use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
@@ -33,12 +34,13 @@ impl VideoDepth {
     /// the other way round.
     ///
     /// # Errors
-    /// The video has another aspect ratio, or ffmpeg is missing.
+    /// The video has another aspect ratio or is in colours, or ffmpeg is missing.
     pub fn open(file: VideoFile, color_px: (u32, u32), white_is_far: bool) -> Result<Self, VideoError> {
         let size_px = fit(file.size_px, color_px);
         if !depth_covers(size_px, color_px) {
             return Err(VideoError::DepthSize { path: file.path, found: file.size_px, color: color_px });
         }
+        refuse_colors(&file, size_px)?;
         let conversion = Conversion { size_px, pixels: Pixels::Grey16, fps: None, start_s: 0.0 };
         let decoder = Decoder::start(&file, &conversion)?;
         let picture = vec![0; size_px.0 as usize * size_px.1 as usize * Pixels::Grey16.bytes()];
@@ -74,6 +76,22 @@ impl DepthSource for VideoDepth {
             *metres = DepthMap::relative_to_metres(if self.white_is_far { 1.0 - white } else { white });
         }
         Ok(())
+    }
+}
+
+/// Refuses a video whose first picture has colours.
+fn refuse_colors(file: &VideoFile, size_px: (u32, u32)) -> Result<(), VideoError> {
+    let conversion = Conversion { size_px, pixels: Pixels::Rgb24, fps: None, start_s: 0.0 };
+    let mut decoder = Decoder::start(file, &conversion)?;
+    let mut picture = vec![0; size_px.0 as usize * size_px.1 as usize * Pixels::Rgb24.bytes()];
+    loop {
+        match decoder.read(&mut picture, PATIENCE)? {
+            Decoded::Waiting => {}
+            Decoded::Picture(_) if has_colors(&picture) => {
+                return Err(VideoError::ColoredDepth { path: file.path.clone() });
+            }
+            Decoded::Picture(_) | Decoded::End => return Ok(()),
+        }
     }
 }
 

@@ -203,6 +203,9 @@ impl Decoder {
     }
 }
 
+/// Draws pictures over white, as transparent photos are shown.
+const ON_WHITE: &str = "format=rgba,split[front][back];[back]drawbox=color=white:thickness=fill:replace=1[white];[white][front]overlay=format=rgb,";
+
 /// Builds the command that writes the pictures of `file` to standard output, and their times to standard error.
 fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
     let Conversion { size_px: (width, height), pixels, fps, start_s } = *conversion;
@@ -211,11 +214,12 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
     let matrix = if file.assumed_matrix == Some(YcbcrMatrix::Bt709) { ":in_color_matrix=bt709" } else { "" };
     let seeks = start_s > 0.0 && !file.is_transport_stream;
     let begin = match start_s > 0.0 && !seeks {
-        true => format!("trim=start={:.6},", file.first_s + start_s),
+        true => format!("trim=start={:.9},", file.first_s + start_s),
         false => String::new(),
     };
+    let background = if file.has_alpha { ON_WHITE } else { "" };
     let filters = format!(
-        "{begin}{fps}scale={width}:{height}:flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix},format={},\
+        "{begin}{fps}{background}scale={width}:{height}:flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix},format={},\
          settb=1/1000000000,showinfo=checksum=0",
         pixels.name()
     );
@@ -233,8 +237,17 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
         // start of the file, as the format has it.
         .args(["-copyts", "-i"])
         .arg(file_url(&file.path))
-        // Without a cover picture.
-        .args(["-map", "0:V:0", "-vf", &filters, frame_timing_option(), "passthrough", "-f", "rawvideo", "pipe:1"])
+        .args([
+            "-map",
+            &format!("0:{}", file.track),
+            "-vf",
+            &filters,
+            frame_timing_option(),
+            "passthrough",
+            "-f",
+            "rawvideo",
+            "pipe:1",
+        ])
         .stdout(Stdio::piped());
     command
 }

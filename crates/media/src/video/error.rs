@@ -54,6 +54,12 @@ pub enum VideoError {
         path.display(), found.0, found.1, color.0, color.1
     )]
     DepthSize { path: PathBuf, found: (u32, u32), color: (u32, u32) },
+    /// A video of depth has colours.
+    #[error(
+        "{}: a video in colours is not depth, as colours have no order; export grey or numbers from the depth tool (such as \
+         --grayscale, --save_npz, or a folder of .npy)", path.display()
+    )]
+    ColoredDepth { path: PathBuf },
     /// A video of depth belongs to other pictures.
     #[error(
         "{}: its depth has {frames} frames, and the pictures have {needed} or more; export the depth of every frame",

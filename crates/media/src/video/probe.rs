@@ -1,5 +1,6 @@
 //! What a video file contains, by ffprobe.
 
+use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -33,6 +34,8 @@ pub struct VideoFile {
     pub frames: Option<u64>,
     /// Length in seconds, if the file states it.
     pub length_s: Option<f64>,
+    /// Number of its track in the file.
+    pub track: u32,
     /// Time of the first picture in the file's own time, in seconds.
     pub first_s: f64,
     /// The same after the file's own start.
@@ -41,8 +44,16 @@ pub struct VideoFile {
     pub is_transport_stream: bool,
     /// The matrix to assume for Y'CbCr, where the file states none.
     pub assumed_matrix: Option<YcbcrMatrix>,
+    /// Whether its pictures may be transparent.
+    pub has_alpha: bool,
     /// Whether there is sound.
     pub has_sound: bool,
+    /// Whether there are subtitles.
+    pub has_subtitles: bool,
+    /// Whether it has a title, a date, a place or the like.
+    pub has_tags: bool,
+    /// What was chosen about it, or is not shown as it should be, a line each.
+    pub remarks: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -56,13 +67,20 @@ struct Answer {
 #[derive(Default, Deserialize)]
 struct Container {
     format_name: Option<String>,
+    #[serde(default)]
+    tags: BTreeMap<String, String>,
     #[serde(flatten)]
     times: Times,
 }
 
 #[derive(Deserialize)]
 struct Stream {
+    index: u32,
     codec_type: Option<String>,
+    pix_fmt: Option<String>,
+    field_order: Option<String>,
+    time_base: Option<String>,
+    start_pts: Option<i64>,
     width: Option<u32>,
     height: Option<u32>,
     sample_aspect_ratio: Option<String>,
@@ -91,6 +109,8 @@ struct SideData {
 
 #[derive(Deserialize)]
 struct Disposition {
+    #[serde(default)]
+    default: u8,
     attached_pic: u8,
 }
 
@@ -109,28 +129,31 @@ impl VideoFile {
         }
         let answer = ask(&mut probe_command(path), path)?;
         let is_video = |stream: &&Stream| is_kind(stream, "video") && stream.disposition.attached_pic == 0;
-        let video = answer.streams.iter().find(is_video);
+        let videos: Vec<&Stream> = answer.streams.iter().filter(is_video).collect();
+        let video = videos.iter().find(|video| video.disposition.default != 0).or(videos.first()).copied();
         let size =
             video.and_then(|video| video.width.zip(video.height)).filter(|&(width, height)| width.min(height) > 0);
         let (Some(video), Some(size)) = (video, size) else {
             return Err(VideoError::NoVideo { path: path.to_owned() });
         };
-        if let Some(curve @ ("smpte2084" | "arib-std-b67")) = video.color_transfer.as_deref() {
-            tracing::warn!("{}: high dynamic range ({curve}) is shown without tone mapping", path.display());
-        }
+        let has = |kind: &str| answer.streams.iter().any(|stream| is_kind(stream, kind));
         let rate = [&video.avg_frame_rate, &video.r_frame_rate].into_iter().find_map(|rate| parse_ratio(rate, '/'));
-        let start_s = |times: &Times| parse_seconds(&times.start_time).unwrap_or(0.0);
         Ok(Self {
             path: path.to_owned(),
             size_px: video.displayed_size(size),
             period_ns: rate.map_or(DEFAULT_PERIOD_NS, |rate| ((1e9 / rate) as u64).max(1)),
             frames: video.nb_frames.as_ref().and_then(|frames| frames.parse().ok()).filter(|&frames| frames > 0),
             length_s: [&video.times, &answer.format.times].into_iter().find_map(|times| parse_seconds(&times.duration)),
-            first_s: start_s(&video.times),
-            offset_s: start_s(&video.times) - start_s(&answer.format.times),
+            track: video.index,
+            first_s: video.first_s(),
+            offset_s: video.first_s() - parse_seconds(&answer.format.times.start_time).unwrap_or(0.0),
             is_transport_stream: answer.format.format_name.as_deref() == Some("mpegts"),
             assumed_matrix: video.color_space.is_none().then(|| YcbcrMatrix::for_height(size.1)),
-            has_sound: answer.streams.iter().any(|stream| is_kind(stream, "audio")),
+            has_alpha: video.has_alpha(),
+            has_sound: has("audio"),
+            has_subtitles: has("subtitle"),
+            has_tags: !answer.format.tags.is_empty(),
+            remarks: video.remarks(videos.len()),
         })
     }
 
@@ -148,6 +171,37 @@ impl VideoFile {
 }
 
 impl Stream {
+    /// Returns the time of the first picture in seconds: to the tick, as ffprobe rounds seconds.
+    fn first_s(&self) -> f64 {
+        let exact = self.start_pts.zip(parse_tick(&self.time_base));
+        exact.map_or_else(
+            || parse_seconds(&self.times.start_time).unwrap_or(0.0),
+            |(ticks, tick_s)| ticks as f64 * tick_s,
+        )
+    }
+
+    /// Returns whether the pixel format has an alpha channel, or a palette, of which one colour may be transparent.
+    fn has_alpha(&self) -> bool {
+        const NAMES: [&str; 8] = ["yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ayuv", "pal8"];
+        let is_grey_alpha = |name: &str| matches!(name, "ya8" | "ya16le" | "ya16be");
+        self.pix_fmt
+            .as_deref()
+            .is_some_and(|name| is_grey_alpha(name) || NAMES.iter().any(|alpha| name.contains(alpha)))
+    }
+
+    /// Returns what is to be said of it, as one of several tracks of pictures.
+    fn remarks(&self, tracks: usize) -> Vec<String> {
+        let by = if self.disposition.default != 0 { "the one marked as default" } else { "the first" };
+        let choice = (tracks > 1).then(|| format!("has {tracks} tracks of pictures, of which {by} is played"));
+        let curve = self.color_transfer.as_deref().filter(|curve| matches!(*curve, "smpte2084" | "arib-std-b67"));
+        let curve = curve.map(|curve| format!("high dynamic range ({curve}) is shown without tone mapping"));
+        let is_interlaced = matches!(self.field_order.as_deref(), Some("tt" | "bb" | "tb" | "bt"));
+        let fields = is_interlaced.then(|| {
+            "interlaced pictures are shown as they are; deinterlace them before: ffmpeg -i IN -vf yadif OUT".to_owned()
+        });
+        [choice, curve, fields].into_iter().flatten().collect()
+    }
+
     /// Returns the size of a stream of `width` x `height` stored pixels on a screen.
     fn displayed_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
         let aspect = parse_ratio(&self.sample_aspect_ratio, ':').unwrap_or(1.0);
@@ -167,9 +221,10 @@ fn probe_command(path: &Path) -> Command {
         .args(INPUT_OPTIONS)
         .args(["-of", "json", "-show_entries"])
         .arg(
-            "stream=codec_type,width,height,sample_aspect_ratio,color_space,color_transfer,avg_frame_rate,r_frame_rate,\
-             nb_frames,start_time,duration:stream_disposition=attached_pic:stream_side_data=rotation:\
-             format=format_name,start_time,duration",
+            "stream=index,codec_type,pix_fmt,field_order,time_base,start_pts,width,height,sample_aspect_ratio,color_space,\
+             color_transfer,avg_frame_rate,r_frame_rate,nb_frames,start_time,duration:\
+             stream_disposition=default,attached_pic:stream_side_data=rotation:format=format_name,start_time,duration:\
+             format_tags=title,artist,date,creation_time,location,comment,description",
         )
         .arg(file_url(path))
         .stdout(Stdio::piped());
@@ -210,6 +265,13 @@ fn parse_ratio(text: &Option<String>, separator: char) -> Option<f64> {
     (1e-3..=1e6).contains(&ratio).then_some(ratio)
 }
 
+/// Parses a time base such as `1/90000`, however small, to seconds.
+fn parse_tick(text: &Option<String>) -> Option<f64> {
+    let (above, below) = text.as_ref()?.split_once('/')?;
+    let tick_s = above.parse::<u32>().ok().map(f64::from)? / below.parse::<u32>().ok().map(f64::from)?;
+    (tick_s > 0.0 && tick_s.is_finite()).then_some(tick_s)
+}
+
 fn parse_seconds(text: &Option<String>) -> Option<f64> {
     text.as_ref()?.parse().ok().filter(|seconds: &f64| seconds.is_finite())
 }
@@ -234,7 +296,7 @@ mod tests {
     #[test]
     fn a_stream_is_as_large_as_it_is_shown() {
         let stream = |json: &str| serde_json::from_str::<Stream>(json).unwrap().displayed_size((720, 576));
-        let disposition = r#""disposition":{"attached_pic":0}"#;
+        let disposition = r#""index":0,"disposition":{"attached_pic":0}"#;
         for (entries, expected) in [
             ("", (720, 576)),
             (r#""sample_aspect_ratio":"64:45","#, (1024, 576)),
@@ -255,11 +317,16 @@ mod tests {
             period_ns: 40_000_000,
             frames: Some(50),
             length_s: None,
+            track: 0,
             first_s: 0.0,
             offset_s: 0.0,
             is_transport_stream: false,
             assumed_matrix: None,
+            has_alpha: false,
             has_sound: false,
+            has_subtitles: false,
+            has_tags: false,
+            remarks: Vec::new(),
         };
         let parts = [(0.0, None), (0.0, Some(9.0)), (0.0, Some(1.0)), (1.5, None), (1.5, Some(1.7)), (9.0, None)];
         assert_eq!(parts.map(|(start, end)| file.count_frames(start, end)), [50, 50, 25, 13, 5, 0].map(Some));

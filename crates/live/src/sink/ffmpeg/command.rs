@@ -134,12 +134,20 @@ pub(super) fn encode_command(
     command
 }
 
-/// Builds the command that copies the pictures of `from` to `to`, and beside them `length_s` seconds of `sound`.
-pub(super) fn sound_command(format: &Format, from: &Path, sound: &Sound, length_s: f64, to: &Path) -> Command {
+/// Builds the command that copies the pictures of `from` to `to`, and beside them title, date and place of `sound` and,
+/// `with_sound`, `length_s` seconds of it.
+pub(super) fn sound_command(
+    format: &Format,
+    from: &Path,
+    (sound, with_sound): (&Sound, bool),
+    length_s: f64,
+    to: &Path,
+) -> Command {
     let muxer = match format.container {
         Container::Mp4 => &["-movflags", "+faststart", "-f", format.faststart.unwrap_or("mp4")],
         Container::Matroska => format.muxer,
     };
+    let tracks: &[&str] = if with_sound { &["-map", "0:v", "-map", "1:a?"] } else { &["-map", "0:v"] };
     let mut command = base_command(FFMPEG);
     command
         .args(["-nostdin", "-y", "-i"])
@@ -147,7 +155,8 @@ pub(super) fn sound_command(format: &Format, from: &Path, sound: &Sound, length_
         .args(INPUT_OPTIONS)
         .args(["-ss", &format!("{:.6}", sound.start_s), "-t", &format!("{length_s:.6}"), "-i"])
         .arg(file_url(&sound.path))
-        .args(["-map", "0:v", "-map", "1:a", "-c", "copy", "-fflags", "+bitexact"])
+        .args(tracks)
+        .args(["-map_metadata", "1", "-c", "copy", "-fflags", "+bitexact"])
         .args(muxer)
         .arg(file_url(to));
     command

@@ -96,13 +96,20 @@ impl Ffmpeg {
             let start_s = sound.start_s + first_ns as f64 / 1e9;
             let length_s = (last_ns - first_ns + self.period_ns) as f64 / 1e9;
             let sound = Sound { start_s, ..sound };
-            match self.copy(|from, to| command::sound_command(&self.format, from, &sound, length_s, to)) {
-                Ok(part) => return self.output.replace_part(part),
-                Err(error) => tracing::warn!(
-                    "{}: without the sound of {}, which cannot be copied: {error}",
-                    self.output.path().display(),
-                    sound.path.display()
-                ),
+            let copy = |with_sound: bool| {
+                let sound = (&sound, with_sound);
+                self.copy(|from, to| command::sound_command(&self.format, from, sound, length_s, to))
+            };
+            let copied = copy(true).or_else(|error| {
+                let error = error.to_string();
+                let is_foreign = error.contains("not currently supported in container");
+                let why = if is_foreign { "files of this kind do not hold it; .mkv and .mov do" } else { &*error };
+                let (path, from) = (self.output.path().display(), sound.path.display());
+                tracing::warn!("{path}: without the sound of {from}, which cannot be copied: {why}");
+                copy(false)
+            });
+            if let Ok(part) = copied {
+                return self.output.replace_part(part);
             }
         }
         if let Some(muxer) = self.format.faststart() {
