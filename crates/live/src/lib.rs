@@ -17,7 +17,7 @@
 //! | 1 | [`capture`], [`depth`] (of depth cameras), [`sink`]: what a run begins and ends with |
 //! | 0 | [`stats`] (the report), `v4l2`, `pipewire`, `control` (the socket of `ctl`), [`camera_control`] |
 //!
-//! `unsafe` is allowed in `pipewire/buffer.rs`, `pipewire/log.rs`, `pipewire/session.rs`, and under `v4l2`, where each
+//! `unsafe` is allowed in `buffer.rs`, `log.rs`, `memory.rs` and `session.rs` of `pipewire`, and under `v4l2`, where each
 //! block has its safety argument.
 
 // What only a feature needs is no reason for attributes of its own.

@@ -9,6 +9,8 @@
 
 mod demand;
 mod devices;
+#[cfg(feature = "pipewire")]
+mod dma_buf;
 mod faults;
 mod formats;
 mod knobs;

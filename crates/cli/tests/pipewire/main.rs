@@ -7,10 +7,12 @@
 mod browsers;
 mod camera;
 mod delay;
+mod dma_buf;
 mod filter;
 #[cfg(feature = "window")]
 #[path = "../../../../tests/common/heard.rs"]
 mod heard;
+mod own_memory;
 #[cfg(feature = "window")]
 mod preview;
 #[path = "../common/program.rs"]

@@ -18,6 +18,7 @@ use bokehcam::frame::fit::Letterbox;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::pool::{Pool, Pooled};
 use bokehcam::link::{self, Received, Receiver, Sender};
+use bokehcam_media::layout::{Family, LayoutError, MAX_PLANES, Plane};
 
 /// Maximum number of pictures in flight: one being decoded, one waiting, and one being received.
 const PICTURES: usize = 3;
@@ -158,7 +159,7 @@ impl PictureDecoder {
     /// Decodes a frame and sends it; fails if it cannot be decoded.
     fn decode(&mut self, frame: &Frame) -> Result<(), String> {
         let Some((negotiated, size)) = self.negotiated.zip(self.size) else { return Ok(()) };
-        let layout = frame_layout(&negotiated, frame)?;
+        let layout = frame_layout(&negotiated, frame).map_err(|error| error.to_string())?;
         let decoder = match self.decoder.take().filter(|decoder| *decoder.layout() == layout) {
             Some(decoder) => decoder,
             None => Decoder::new(&layout).map_err(|error| error.to_string())?,
@@ -226,7 +227,7 @@ impl PictureHandler for PictureDecoder {
 }
 
 /// Computes a frame's memory layout: formats of several components arrive in one plane, or in one per component.
-fn frame_layout(negotiated: &NegotiatedFormat, frame: &Frame) -> Result<Layout, String> {
+fn frame_layout(negotiated: &NegotiatedFormat, frame: &Frame) -> Result<Layout, LayoutError> {
     let apart = match (&negotiated.fourcc, frame.planes.len()) {
         (_, 0 | 1) => negotiated.fourcc,
         (b"NV12", _) => *b"NM12",
@@ -236,8 +237,17 @@ fn frame_layout(negotiated: &NegotiatedFormat, frame: &Frame) -> Result<Layout, 
         (other, _) => *other,
     };
     let (width, height) = negotiated.size;
-    let layout = Layout::with_stride(FourCc(apart), width, height, frame.stride_bytes);
-    layout.map_err(|error| error.to_string())
+    let whole = Layout::with_stride(FourCc(negotiated.fourcc), width, height, frame.strides_bytes[0])?;
+    let mut planes = [Plane::default(); MAX_PLANES];
+    let given = frame.strides_bytes.iter().zip(frame.planes);
+    for ((plane, component), (&stride_bytes, bytes)) in planes.iter_mut().zip(whole.components()).zip(given) {
+        // libcamera states luma's stride for all planes, although rows of chroma may be shorter.
+        let end_bytes = stride_bytes.saturating_mul(component.rows - 1).saturating_add(component.row_bytes);
+        let is_its_own = stride_bytes > 0 && end_bytes <= bytes.len();
+        plane.stride_bytes = if is_its_own { stride_bytes } else { component.stride_bytes };
+    }
+    let count = FourCc(apart).family().map_or(1, Family::memory_plane_count);
+    Layout::new(FourCc(apart), negotiated.size, &planes[..count], None)
 }
 
 /// Converts a mode to V4L2's representation.
@@ -270,60 +280,4 @@ pub fn format_modes(mode: &Mode) -> FormatModes {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// libcamera's processing on GPUs pads rows to 2048 bytes.
-    #[test]
-    fn padded_rows_are_read_as_rows_without_padding() {
-        const SIZE: (usize, usize) = (6, 4);
-        const PADDED: usize = 2048;
-        // A luma plane and one of chroma pairs with half the rows, each with `stride` bytes per row.
-        let rows = |rows: usize, stride: usize, first: usize| -> Vec<u8> {
-            let byte = |x: usize, y: usize| if x < SIZE.0 { (first + 31 * y + 7 * x) as u8 } else { 0xee };
-            (0..rows).flat_map(|y| (0..stride).map(move |x| byte(x, y))).collect()
-        };
-        let picture = |stride: usize, in_two_planes: bool| {
-            let planes = [rows(SIZE.1, stride, 20), rows(SIZE.1 / 2, stride, 90)];
-            let whole = planes.concat();
-            let planes: &[&[u8]] = if in_two_planes { &[&planes[0], &planes[1]] } else { &[&whole] };
-            let (sender, mut receiver) = link::live();
-            let any = ModeRequest::for_content(bokehcam_media::layout::Content::Color);
-            let mut decoder = PictureDecoder::new(any, sender);
-            decoder.set_format(&NegotiatedFormat { fourcc: *b"NV12", size: (6, 4), rate: (30, 1) });
-            decoder.decode(&Frame { planes, stride_bytes: stride, captured_ns: 0 }).unwrap();
-            let Received::Item(picture) = receiver.recv_timeout(MAX_WAIT) else { panic!("there is a picture") };
-            picture.color.rgb.clone()
-        };
-        let plain = picture(SIZE.0, false);
-        assert!(plain.iter().any(|&code| code != plain[0]));
-        for (stride, in_two_planes) in [(SIZE.0, true), (PADDED, false), (PADDED, true)] {
-            assert_eq!(picture(stride, in_two_planes), plain, "{stride} bytes per row, in two planes: {in_two_planes}");
-        }
-    }
-
-    #[test]
-    fn modes_are_ranked_as_those_of_other_cameras() {
-        let mode = |fourcc: &[u8; 4], sizes, rates| Mode { fourcc: *fourcc, sizes, rates };
-        let modes = [
-            mode(b"MJPG", Offer::These(vec![(1920, 1080), (1280, 720)]), Offer::These(vec![(30, 1), (60, 1)])),
-            mode(b"YUYV", Offer::These(vec![(640, 480), (1280, 720)]), Offer::These(vec![(15, 1), (30, 1)])),
-            mode(b"NV12", Offer::Range { min: (2, 2), max: (4096, 4096) }, Offer::Range { min: (0, 1), max: (120, 1) }),
-        ];
-        let chosen = |request: ModeRequest| {
-            let (sender, _receiver) = link::live();
-            let mut picture_decoder = PictureDecoder::new(request, sender);
-            let NegotiatedFormat { fourcc, size, rate } = picture_decoder.choose_mode(&modes).unwrap();
-            format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
-        };
-        let any = ModeRequest::for_content(bokehcam_media::layout::Content::Color);
-        let format = |fourcc: &str| ModeRequest { fourcc: Some(fourcc.parse().unwrap()), ..any };
-        assert_eq!(chosen(format("YUYV")), "YUYV (1280, 720) 30/1");
-        assert_eq!(chosen(format("NV12")), "NV12 (1280, 720) 30/1");
-        assert_eq!(
-            chosen(ModeRequest { size_px: Some((1920, 1080)), fps: Some(60.0), ..format("MJPG") }),
-            "MJPG (1920, 1080) 60/1"
-        );
-        assert_eq!(chosen(ModeRequest { size_px: Some((640, 360)), ..any }), "NV12 (640, 360) 30/1");
-    }
-}
+mod tests;

@@ -8,14 +8,17 @@ mod buffer;
 mod error;
 pub mod graph;
 mod log;
+pub mod memory;
 pub mod mode;
 pub mod node;
-mod param;
+pub mod param;
 pub mod reader;
-mod session;
+pub mod session;
 mod wake;
 pub mod watch;
 
+/// For cameras of the tests.
+pub use ::pipewire as bindings;
 pub use error::PipeWireError;
 use error::Result;
 

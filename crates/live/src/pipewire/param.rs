@@ -76,13 +76,22 @@ fn value_or_choice<T: CanonicalFixedSizedPod>(
     }
 }
 
-/// Describes buffers in memory, with the layout chosen by the other side.
-pub fn build_any_buffers() -> Vec<u8> {
-    serialize_object(
-        SpaTypes::ObjectParamBuffers,
-        ParamType::Buffers,
-        vec![buffer_count_property(), memory_type_property()],
-    )
+/// Types of memory, as bits.
+const MEMORY: i32 = (1 << sys::SPA_DATA_MemFd) | (1 << sys::SPA_DATA_MemPtr);
+const DMA_BUF: i32 = 1 << sys::SPA_DATA_DmaBuf;
+
+/// Describes buffers with the layout chosen by the other side: in memory, or else in DMA-BUFs. In a single choice, a camera
+/// that has both would take the latter, which processors may read slowly.
+///
+/// The DMA-BUFs are linear, as a processor reads them: formats without a modifier, as [`build_offer`] has them, say so.
+pub fn build_any_buffers() -> [Vec<u8>; 2] {
+    [MEMORY, DMA_BUF].map(|types| {
+        serialize_object(
+            SpaTypes::ObjectParamBuffers,
+            ParamType::Buffers,
+            vec![buffer_count_property(), memory_type_property(types)],
+        )
+    })
 }
 
 /// Describes buffers with one plane in memory, of `frame_bytes` bytes with `stride` bytes per row.
@@ -96,7 +105,7 @@ pub fn build_buffers(frame_bytes: i32, stride: i32) -> Vec<u8> {
             int(sys::SPA_PARAM_BUFFERS_blocks, 1),
             int(sys::SPA_PARAM_BUFFERS_size, frame_bytes),
             int(sys::SPA_PARAM_BUFFERS_stride, stride),
-            memory_type_property(),
+            memory_type_property(MEMORY),
         ],
     )
 }
@@ -106,9 +115,8 @@ fn buffer_count_property() -> Property {
     choice_property(sys::SPA_PARAM_BUFFERS_buffers, ChoiceEnum::Range { default, min, max })
 }
 
-fn memory_type_property() -> Property {
-    let default = (1 << sys::SPA_DATA_MemFd) | (1 << sys::SPA_DATA_MemPtr);
-    choice_property(sys::SPA_PARAM_BUFFERS_dataType, ChoiceEnum::Flags { default, flags: vec![] })
+fn memory_type_property(types: i32) -> Property {
+    choice_property(sys::SPA_PARAM_BUFFERS_dataType, ChoiceEnum::Flags { default: types, flags: vec![] })
 }
 
 fn choice_property(key: u32, choice: ChoiceEnum<i32>) -> Property {

@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use pipewire::buffer::Buffer;
 use pipewire::properties::properties;
-use pipewire::spa::buffer::ChunkFlags;
 use pipewire::spa::buffer::meta::{MetaHeader, MetaHeaderFlags};
 use pipewire::spa::param::ParamType;
 use pipewire::spa::pod::Pod;
@@ -17,6 +16,7 @@ use pipewire::spa::utils::Direction;
 use pipewire::stream::{Stream, StreamFlags, StreamRc, StreamState};
 
 use super::graph::{Camera, Graph};
+use super::memory::BufferMemory;
 use super::mode::{self, Mode, NegotiatedFormat};
 use super::param;
 use super::session::Session;
@@ -42,8 +42,8 @@ const MAX_MISSED: u64 = 1000;
 pub struct Frame<'a> {
     /// The used bytes of each plane.
     pub planes: &'a [&'a [u8]],
-    /// Bytes per row of the first plane; 0 if not stated.
-    pub stride_bytes: usize,
+    /// Bytes per row of each plane; 0 if not stated.
+    pub strides_bytes: &'a [usize],
     /// Capture time on the system's monotonic clock.
     pub captured_ns: u64,
 }
@@ -182,6 +182,8 @@ impl Listener {
         let has_ended = Rc::new(Cell::new(false));
         let [formats, pictures] = std::array::from_fn(|_| Rc::clone(self));
         let ended = Rc::clone(&has_ended);
+        let memory = Rc::new(RefCell::new(BufferMemory::default()));
+        let removed = Rc::clone(&memory);
         let _listener = stream
             .add_local_listener::<()>()
             .state_changed(move |_, (), old, state| {
@@ -196,12 +198,13 @@ impl Listener {
                     formats.handle_format(stream, format.as_bytes());
                 }
             })
-            .process(move |stream, ()| pictures.receive_newest(stream))
+            .remove_buffer(move |_, (), _| removed.borrow_mut().clear())
+            .process(move |stream, ()| pictures.receive_newest(stream, &mut memory.borrow_mut()))
             .register()
             .map_err(PipeWireError::refused("to be listened to"))?;
         let format = param::build_format(&requested);
         let mut formats: Vec<&Pod> = Pod::from_bytes(&format).into_iter().collect();
-        let flags = StreamFlags::AUTOCONNECT | StreamFlags::DONT_RECONNECT | StreamFlags::MAP_BUFFERS;
+        let flags = StreamFlags::AUTOCONNECT | StreamFlags::DONT_RECONNECT;
         stream.connect(Direction::Input, None, flags, &mut formats).map_err(PipeWireError::refused("a reader"))?;
         let (waker_handle, descriptor) = (waker.clone(), waker.descriptor().map_err(PipeWireError::Thread)?);
         let _wake_source = session.event_loop().add_io(descriptor, IoFlags::IN, move |_| waker_handle.clear());
@@ -264,7 +267,8 @@ impl Listener {
         };
         self.negotiated.set(Some(negotiated));
         self.handler.borrow_mut().set_format(&negotiated);
-        let pods = [param::build_any_buffers(), param::build_header_request()];
+        let [memory, dma_bufs] = param::build_any_buffers();
+        let pods = [memory, dma_bufs, param::build_header_request()];
         let mut pods: Vec<&Pod> = pods.iter().filter_map(|pod| Pod::from_bytes(pod)).collect();
         if let Err(error) = stream.update_params(&mut pods) {
             tracing::warn!("{}: PipeWire refused the buffers: {error}", self.name());
@@ -277,7 +281,7 @@ impl Listener {
     }
 
     /// Dequeues the newest picture.
-    fn receive_newest(&self, stream: &Stream) {
+    fn receive_newest(&self, stream: &Stream, memory: &mut BufferMemory) {
         let mut newest: Option<Buffer> = None;
         let mut stale = 0;
         while let Some(buffer) = stream.dequeue_buffer() {
@@ -296,31 +300,18 @@ impl Listener {
             self.sequence.replace(Some(sequence)).map_or(0, |last| sequence.saturating_sub(last.saturating_add(1)));
         // The camera did deliver the stale ones.
         let missed = if gap > MAX_MISSED { 0 } else { gap.saturating_sub(stale) };
-        let mut is_corrupt = header.as_ref().is_some_and(|header| header.flags().contains(MetaHeaderFlags::CORRUPTED));
+        let is_corrupt = header.as_ref().is_some_and(|header| header.flags().contains(MetaHeaderFlags::CORRUPTED));
         let stamp_ns = header.as_ref().and_then(|header| u64::try_from(header.pts()).ok());
         let is_plausible = |stamp_ns: &u64| (now_ns.saturating_sub(MAX_AGE_NS)..=now_ns).contains(stamp_ns);
-        let mut planes: [&[u8]; 3] = [&[]; 3];
-        let (mut count, mut stride_bytes) = (0, 0);
-        for (plane, data) in planes.iter_mut().zip(buffer.datas_mut()) {
-            let (offset, size) = (data.chunk().offset() as usize, data.chunk().size() as usize);
-            is_corrupt |= data.chunk().flags().contains(ChunkFlags::CORRUPTED);
-            if count == 0 {
-                stride_bytes = usize::try_from(data.chunk().stride()).unwrap_or(0);
-            }
-            let used = |bytes: &'_ mut [u8]| offset..offset.saturating_add(size).min(bytes.len());
-            let Some(bytes) = data.data() else { break };
-            let used = used(bytes);
-            *plane = bytes.get(used).unwrap_or(&[]);
-            count += 1;
-        }
-        let is_empty = planes[0].is_empty();
+        let picture = if is_corrupt { None } else { memory.read(buffer.datas_mut()) };
         let mut handler = self.handler.borrow_mut();
-        if missed + stale > 0 || is_corrupt || is_empty {
-            handler.add_losses(missed, stale, u64::from(is_corrupt || is_empty));
+        if missed + stale > 0 || picture.is_none() {
+            handler.add_losses(missed, stale, u64::from(picture.is_none()));
         }
-        if !is_corrupt && !is_empty {
+        if let Some(picture) = picture {
             let captured_ns = stamp_ns.filter(is_plausible).unwrap_or(now_ns);
-            handler.handle_frame(&Frame { planes: &planes[..count], stride_bytes, captured_ns });
+            let (planes, strides_bytes) = (picture.planes(), picture.strides_bytes());
+            handler.handle_frame(&Frame { planes, strides_bytes, captured_ns });
         }
     }
 }
