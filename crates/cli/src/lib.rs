@@ -4,6 +4,7 @@
 // What only a feature needs is no reason for attributes of its own.
 #![cfg_attr(not(feature = "packaged"), allow(dead_code, unused_imports, unused_variables))]
 
+mod browsers;
 mod commands;
 mod controlled;
 mod error;

@@ -1,5 +1,6 @@
 //! `service`: starts the virtual camera with every session, by a systemd user unit.
 
+mod browser_flags;
 mod manager;
 
 use std::path::{Path, PathBuf};
@@ -37,8 +38,12 @@ pub struct ServiceCommand {
 #[derive(Clone, Copy, Debug, Subcommand)]
 enum What {
     /// Start it now, and with every session from now on
-    On,
-    /// Stop it now, and do not start it any more
+    On {
+        /// Add --enable-features=WebRtcPipeWireCamera to the flags files of browsers of the Chromium family, without asking
+        #[arg(long)]
+        browser_flags: bool,
+    },
+    /// Stop it now, do not start it any more, and remove the flags that it added for browsers
     Off,
     /// Print the status; `service` alone does the same
     Status,
@@ -60,12 +65,18 @@ const STARTUP_TIME: Duration = Duration::from_secs(1);
 /// Fails if there is no systemd user session, the unit cannot be written, or systemd refuses.
 pub fn run(command: &ServiceCommand) -> Result<(), CliError> {
     match command.what.unwrap_or(What::Status) {
-        What::On => {
+        What::On { browser_flags } => {
             enable(Unit::query()?)?;
             thread::sleep(STARTUP_TIME);
-            print_status(&Unit::query()?)
+            let unit = Unit::query()?;
+            print_status(&unit)?;
+            let (arguments, _) = read_stream_arguments(&unit.arguments)?;
+            if is_pipewire_camera(&arguments) { browser_flags::offer(browser_flags) } else { Ok(()) }
         }
-        What::Off => disable(&Unit::query()?),
+        What::Off => {
+            disable(&Unit::query()?)?;
+            browser_flags::remove()
+        }
         What::Status => print_status(&Unit::query()?),
     }
 }
@@ -158,6 +169,17 @@ fn read_stream_arguments(default: &str) -> Result<(String, String), CliError> {
     })
 }
 
+/// Whether a stream with these arguments is a camera of PipeWire.
+fn is_pipewire_camera(arguments: &str) -> bool {
+    let words: Vec<&str> = arguments.split_whitespace().collect();
+    let separate = words.windows(2).filter(|pair| pair[0] == "--to").map(|pair| pair[1]);
+    let mut targets = separate.chain(words.iter().filter_map(|word| word.strip_prefix("--to=")));
+    targets.any(|target| {
+        let target = target.trim_matches(['"', '\'']);
+        target == "pipewire" || target.starts_with("pipewire:")
+    })
+}
+
 /// Returns the path of the user's own unit.
 fn unit_path() -> Result<PathBuf, CliError> {
     let config = user_dir("XDG_CONFIG_HOME", ".config");
@@ -187,6 +209,16 @@ mod tests {
     fn the_unit_starts_one_program_with_the_arguments_of_one_line() {
         assert_eq!(UNIT.matches(&format!("ExecStart={PROGRAM} stream --tray $STREAM\n")).count(), 1);
         assert_eq!(UNIT.matches(DEFAULT).count(), 1);
-        assert!(!default_stream_arguments().is_empty());
+        assert!(is_pipewire_camera(default_stream_arguments()));
+    }
+
+    #[test]
+    fn only_outputs_make_a_pipewire_camera() {
+        for arguments in ["0 --to pipewire", "0 --to /dev/video10 --to pipewire:Desk", "0 --to='pipewire:My desk'"] {
+            assert!(is_pipewire_camera(arguments), "{arguments}");
+        }
+        for arguments in ["pipewire:cam --to /dev/video10", "0 --to pipewire.mp4", "0", "0 --to"] {
+            assert!(!is_pipewire_camera(arguments), "{arguments}");
+        }
     }
 }

@@ -20,7 +20,7 @@ use crate::program::{Beside, Home, PORTRAIT};
 const HANG: Duration = Duration::from_secs(60);
 
 /// Opens a pseudo-terminal; returns the master side, which reads the output, and the path of the slave side.
-fn terminal() -> (File, PathBuf) {
+pub fn terminal() -> (File, PathBuf) {
     const UNLOCK: u32 = opcode::write::<i32>(b'T', 0x31);
     const NUMBER: u32 = opcode::read::<u32>(b'T', 0x30);
     let screen = OpenOptions::new().read(true).write(true).open("/dev/ptmx").unwrap();
@@ -32,7 +32,7 @@ fn terminal() -> (File, PathBuf) {
     (screen, PathBuf::from(format!("/dev/pts/{number}")))
 }
 
-fn open_terminal(name: &Path) -> File {
+pub fn open_terminal(name: &Path) -> File {
     let no_controlling = OFlags::NOCTTY.bits() as i32;
     OpenOptions::new().read(true).write(true).custom_flags(no_controlling).open(name).unwrap()
 }

@@ -1,26 +1,17 @@
 //! Checks of PipeWire cameras: the daemon, the session manager, the desktop portal that browsers use, and permissions.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
 use super::finding::{Finding, PipeWireResults};
 use super::system::System;
+use crate::browsers::{self, Browser, Features};
 use bokehcam_live::pipewire::PipeWireError;
 use bokehcam_live::pipewire::graph::Graph;
 
 pub const TOPIC: &str = "PipeWire";
-
-/// Browsers: program names, display name, and the switch that makes them list PipeWire's cameras.
-const BROWSERS: [(&[&str], &str, &str); 2] = [
-    (
-        &["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "brave-browser", "microsoft-edge"],
-        "Chromium",
-        "chrome://flags/#enable-webrtc-pipewire-camera (or --enable-features=WebRtcPipeWireCamera), then start it again",
-    ),
-    (&["firefox", "firefox-esr"], "Firefox", "about:config, media.webrtc.camera.allow-pipewire = true"),
-];
 
 /// Checks the requirements of a PipeWire camera, from the daemon to the browsers.
 pub fn check_pipewire(system: &System) -> PipeWireResults {
@@ -55,17 +46,33 @@ pub fn check_pipewire(system: &System) -> PipeWireResults {
         findings.push(Finding::note(TOPIC, "the desktop portal sees no camera, although PipeWire has one", fix));
     }
     findings.extend(check_refusals());
-    findings.extend(BROWSERS.iter().filter(|(programs, ..)| programs.iter().any(|name| is_installed(name))).map(
-        |(_, name, switch)| {
-            Finding::note(TOPIC, format!("{name} lists PipeWire cameras only after a change of its settings"), *switch)
-        },
-    ));
+    findings.extend(check_browsers());
     let readable = all.iter().filter(|camera| has_manager && !camera.process.is_some_and(is_bokehcam));
     PipeWireResults {
         can_publish: has_manager,
         cameras: readable.map(|camera| camera.label.clone()).collect(),
         findings,
     }
+}
+
+/// Reports which browsers list PipeWire's cameras by a flags file, and which need a change of their settings.
+fn check_browsers() -> Vec<Finding> {
+    let change = |name: &str, switch: String| {
+        Finding::note(TOPIC, format!("{name} lists PipeWire cameras only after a change of its settings"), switch)
+    };
+    let chromium = browsers::find_browsers().into_iter().map(|Browser { name, flags_file }| {
+        let is_on = |file: &PathBuf| browsers::read_features(file).is_ok_and(|on| on == Features::PipeWireCamera);
+        match flags_file.filter(is_on) {
+            Some(file) => {
+                Finding::good(TOPIC, format!("{name}: PipeWire cameras are on by {}", browsers::shorten(&file)))
+            }
+            None => change(name, format!("{} (or {}), then start it again", browsers::SETTING, browsers::FLAG)),
+        }
+    });
+    let firefox = ["firefox", "firefox-esr"].iter().find_map(|name| browsers::find_program(name));
+    let firefox =
+        firefox.map(|_| change("Firefox", "about:config, media.webrtc.camera.allow-pipewire = true".to_owned()));
+    chromium.chain(firefox).collect()
 }
 
 /// Whether a process is an instance of this program: its output does not count as a camera.
@@ -119,11 +126,6 @@ fn call_bus(question: &[&str]) -> Option<Value> {
         .stderr(Stdio::null())
         .output();
     serde_json::from_slice(&output.ok().filter(|answer| answer.status.success())?.stdout).ok()
-}
-
-fn is_installed(program: &str) -> bool {
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&folders).any(|folder| Path::new(&folder).join(program).is_file())
 }
 
 #[cfg(test)]

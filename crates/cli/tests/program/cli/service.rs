@@ -1,9 +1,13 @@
 //! The command `service`, with a fake `systemctl` that records its calls.
 
 use std::fs;
+use std::io::{Read, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use crate::program::{Home, PROGRAM, ROOT, Ran};
+use crate::terminal::{open_terminal, terminal};
 
 /// A fake `systemctl`: files in its folder hold the unit's load, enablement and activity state.
 const SYSTEMCTL: &str = r#"
@@ -59,8 +63,24 @@ impl Session {
     }
 
     fn service(&self, what: &str) -> Ran {
-        let path = format!("{}:/usr/bin:/bin", self.at("").display());
-        Ran::of(self.home.command(&["service", what]).env("PATH", path))
+        Ran::of(&mut self.command(&["service", what]))
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = self.home.command(args);
+        command.env("PATH", format!("{}:/usr/bin:/bin", self.at("").display())).env("HOME", self.home.path("user"));
+        command
+    }
+
+    /// Adds a browser that reads a flags file in the folder for settings; returns the path of that file.
+    fn add_browser(&self, program: &str, file: &str) -> PathBuf {
+        let flags = format!("$(cat \"${{XDG_CONFIG_HOME:-~/.config}}/{file}\")");
+        self.home.add_program(program, &format!("exec /usr/lib/browser {flags} \"$@\""));
+        self.home.path("config").join(file)
+    }
+
+    fn add_flags(&self) -> Ran {
+        Ran::of(&mut self.command(&["service", "on", "--browser-flags"]))
     }
 
     /// Returns the recorded calls, except queries.
@@ -184,4 +204,109 @@ fn what_keeps_it_from_running_is_said_in_plain_words() {
     let ran = Ran::of(none.home.command(&["service", "on"]).env("PATH", none.at("")));
     assert!(ran.code == 1 && ran.stderr.contains("there is no systemd here"), "{}", ran.stderr);
     assert!(!none.unit().exists(), "a unit that nobody reads");
+}
+
+const FLAG: &str = "--enable-features=WebRtcPipeWireCamera\n";
+
+#[test]
+fn the_flag_of_browsers_is_named_and_added_when_that_is_wished() {
+    let session = Session::new("active");
+    let chromium = session.add_browser("chromium", "chromium-flags.conf");
+    let on = session.service("on");
+    assert!(on.code == 0 && on.stderr.contains("`bokehcam service on --browser-flags` adds it"), "{}", on.stderr);
+    assert!(on.stderr.contains(chromium.to_str().unwrap()) && !chromium.exists(), "{}", on.stderr);
+
+    for time in 0..2 {
+        let on = session.add_flags();
+        assert_eq!(on.stderr.matches("start the browser again").count(), 1 - time, "{}", on.stderr);
+        assert_eq!(fs::read_to_string(&chromium).unwrap(), FLAG);
+    }
+    let off = session.service("off");
+    assert!(off.code == 0 && off.stderr.contains("removed --enable-features="), "{}", off.stderr);
+    assert!(!chromium.exists(), "it was not there before");
+    assert_eq!(session.service("off").stderr.matches("removed").count(), 0);
+}
+
+#[test]
+fn a_flags_file_stays_as_it_is_but_for_the_line() {
+    let session = Session::new("active");
+    let chromium = session.add_browser("chromium", "chromium-flags.conf");
+    let dotfiles = session.home.path("dotfiles");
+    fs::create_dir_all(&dotfiles).unwrap();
+    fs::create_dir_all(chromium.parent().unwrap()).unwrap();
+    let own = "# --enable-features=Old\n\n--ozone-platform=wayland\t\r\n  --incognito";
+    fs::write(dotfiles.join("chromium"), own).unwrap();
+    fs::set_permissions(dotfiles.join("chromium"), fs::Permissions::from_mode(0o640)).unwrap();
+    symlink(dotfiles.join("chromium"), &chromium).unwrap();
+    session.add_flags();
+    assert_eq!(fs::read_to_string(&chromium).unwrap(), format!("{FLAG}{own}"));
+    assert_eq!(fs::read_link(&chromium).unwrap(), dotfiles.join("chromium"));
+    // What its user writes meanwhile stays, too.
+    fs::write(&chromium, format!("--new\n{FLAG}{own}")).unwrap();
+    session.service("off");
+    assert_eq!(fs::read_to_string(&chromium).unwrap(), format!("--new\n{own}"));
+    assert_eq!(chromium.metadata().unwrap().mode() & 0o777, 0o640);
+    assert!(chromium.is_symlink());
+
+    // A link to nothing is not replaced.
+    fs::remove_file(dotfiles.join("chromium")).unwrap();
+    let on = session.add_flags();
+    assert!(on.code == 1 && on.stderr.contains("link to nothing") && chromium.is_symlink(), "{}", on.stderr);
+}
+
+#[test]
+fn the_users_own_flags_are_left_alone() {
+    let session = Session::new("active");
+    let chromium = session.add_browser("chromium", "chromium-flags.conf");
+    let brave = session.add_browser("brave", "brave-flags.conf");
+    session.home.add_program("google-chrome-stable", "exec /opt/google/chrome/chrome \"$@\"");
+    let flatpak = session.home.path("user/.var/app/com.google.Chrome/config/chrome-flags.conf");
+    fs::create_dir_all(flatpak.parent().unwrap().parent().unwrap()).unwrap();
+    fs::create_dir_all(chromium.parent().unwrap()).unwrap();
+    let kept = [(&chromium, FLAG.to_owned()), (&brave, "--enable-features=\"Vulkan,VaapiVideoDecoder\"\n".to_owned())];
+    kept.iter().for_each(|(file, text)| fs::write(file, text).unwrap());
+    let on = session.add_flags();
+    assert!(
+        on.stderr.contains("Brave lists PipeWire cameras with ,WebRtcPipeWireCamera at the end of"),
+        "{}",
+        on.stderr
+    );
+    assert!(on.stderr.contains("Chrome lists PipeWire cameras after chrome://flags/"), "{}", on.stderr);
+    let place = "added --enable-features=WebRtcPipeWireCamera to ~/.var/app/com.google.Chrome/config/chrome-flags.conf";
+    assert!(on.stderr.contains(place), "{}", on.stderr);
+    assert_eq!(fs::read_to_string(&flatpak).unwrap(), FLAG);
+    session.service("off");
+    assert!(!flatpak.exists());
+    kept.iter().for_each(|(file, text)| assert_eq!(&fs::read_to_string(file).unwrap(), text));
+
+    // Of several, only the last counts.
+    fs::write(&chromium, format!("{FLAG}--enable-features=Vulkan,\n")).unwrap();
+    let on = session.add_flags();
+    assert!(on.stderr.contains("Chromium lists PipeWire cameras with ,WebRtcPipeWireCamera"), "{}", on.stderr);
+
+    // A v4l2loopback camera needs no flag.
+    let conf = session.home.settings().with_file_name("stream.conf");
+    fs::create_dir_all(conf.parent().unwrap()).unwrap();
+    fs::write(&conf, "STREAM=\"0 --to /dev/video10\"\n").unwrap();
+    assert!(!session.service("on").stderr.contains("PipeWire cameras"));
+}
+
+#[test]
+fn at_a_terminal_the_flag_is_asked_about() {
+    for (answer, is_added) in [("y\n", true), ("\n", false), ("no\n", false)] {
+        let session = Session::new("active");
+        let chromium = session.add_browser("chromium", "chromium-flags.conf");
+        let (mut screen, name) = terminal();
+        let [stdin, stderr] = [(); 2].map(|()| open_terminal(&name));
+        screen.write_all(answer.as_bytes()).unwrap();
+        let mut command = session.command(&["service", "on"]);
+        let code = command.stdin(stdin).stdout(Stdio::null()).stderr(stderr).status().unwrap().code();
+        // Without a program at the terminal, reading it fails after the last byte.
+        drop(command);
+        let mut said = Vec::new();
+        screen.read_to_end(&mut said).unwrap_err();
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!((code, chromium.exists()), (Some(0), is_added), "{said}");
+        assert!(said.contains("[y/N]"), "{said}");
+    }
 }
