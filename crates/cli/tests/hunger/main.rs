@@ -161,7 +161,7 @@ fn a_file_is_known_by_its_first_bytes() {
         path
     };
     for (name, start, says) in [
-        ("zeros.png", &b""[..], "not a PNG, JPEG, TIFF, WebP, BMP or GIF file"),
+        ("zeros.png", &b""[..], "not a PNG, JPEG, TIFF, WebP, BMP, PNM or GIF file"),
         ("zeros.jpg", b"\xff\xd8\xff\xe0\0\x04", "no frame where one should be"),
         ("png.png", b"\x89PNG\r\n\x1a\n", "damaged"),
         ("zeros.pfm", b"", "not a PNG, JPEG, TIFF, PFM, NPY, NPZ or EXR file"),

@@ -51,7 +51,7 @@ fn a_photo_its_map_and_its_mask_are_turned_before_anything_else() {
     ] {
         let refine = if with.is_empty() { &["--refine", "off"][..] } else { &[] };
         let render = |image: &str, out: &str, more: &[&[&str]]| {
-            let args = ["render", image, "--out", out, "--force", "--backend", "cpu", "-q"];
+            let args = ["render", image, "--out", out, "--force", "--backend", "cpu", "-q", "--depth-scale", "5000"];
             home.run(&[&args[..], &more.concat()].concat()).done();
         };
         render("in.png", "by-option.png", &[&TURN, with, refine]);

@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use bokehcam::frame::ColorImage;
-use bokehcam_media::recording::PhotoMetadata;
 use bokehcam_media::recording::still::{read_photo, write_photo};
+use bokehcam_media::recording::{Photo, PhotoMetadata};
 use image::{ImageBuffer, Rgba};
 
 use crate::common::color;
@@ -59,7 +59,7 @@ fn what_goes_with_a_picture_stays_with_it() {
     write_photo(&home.path("in.jpg"), &ColorImage::new(40, 30), &metadata, false).unwrap();
     for out in ["out.png", "out.jpg", "out.webp", "out.tif"] {
         let said = render(&home, "in.jpg", out);
-        let mut kept = read_photo(&home.path(out)).unwrap().1;
+        let mut kept = Photo::read(&home.path(out)).unwrap().metadata;
         if matches!(out, "out.png" | "out.webp") {
             assert!(said.starts_with(&format!("note: not in {out}: captions and rights as IPTC\n")), "{said}");
             kept.image_resources = metadata.image_resources.clone();
@@ -75,7 +75,7 @@ fn what_goes_with_a_picture_stays_with_it() {
     }
     // From TIFF to the others, too.
     render(&home, "out.tif", "again.jpg");
-    let kept = read_photo(&home.path("again.jpg")).unwrap().1;
+    let kept = Photo::read(&home.path("again.jpg")).unwrap().metadata;
     assert!(kept.exif.unwrap().windows(4).any(|part| part == b"CAM\0") && kept.xmp == metadata.xmp);
     assert_eq!(kept.image_resources, metadata.image_resources);
 }

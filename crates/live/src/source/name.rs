@@ -88,6 +88,11 @@ impl FromStr for SourceName {
     }
 }
 
+/// Splits the names of two files, as of a left and a right video.
+fn split_files(text: &str) -> Option<(&str, &str)> {
+    text.split_once(',').filter(|(left, right)| [left, right].iter().all(|name| Path::new(name).is_file()))
+}
+
 /// Returns whether a text is meant as a path rather than the name of a camera.
 fn is_path(text: &str) -> bool {
     text.contains('/') && !text.starts_with("/dev/")
@@ -169,6 +174,10 @@ impl SourceName {
                 accepted_sources()
             )),
             _ if pictures::pattern_folder(path).is_some() => Ok(SourceName::Folder(path.to_owned())),
+            Some(text) if let Some((left, right)) = split_files(text) => SourceError::usage_error(format!(
+                "two files are no source; of videos of two cameras make one, side by side, and play it with --side-by-side: \
+                 ffmpeg -i {left} -i {right} -filter_complex hstack BOTH.mkv"
+            )),
             Some(text) if is_path(text) => Err(missing_path_error(text)),
             Some("") => SourceError::usage_error(format!("the name is empty: use {}", accepted_sources())),
             Some(text) => cameras::parse(text),

@@ -204,7 +204,8 @@ impl Decoder {
 }
 
 /// Draws pictures over white, as transparent photos are shown.
-const ON_WHITE: &str = "format=rgba,split[front][back];[back]drawbox=color=white:thickness=fill:replace=1[white];[white][front]overlay=format=rgb,";
+const ON_WHITE: &str = "format=rgba,split[front][back];[back]lutrgb=r=255:g=255:b=255:a=255[white];\
+                        [white][front]overlay=format=rgb,";
 
 /// Builds the command that writes the pictures of `file` to standard output, and their times to standard error.
 fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {

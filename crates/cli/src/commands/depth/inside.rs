@@ -8,7 +8,7 @@ use crate::options::Global;
 use crate::terminal;
 use bokehcam::frame::DepthMap;
 use bokehcam_live::source::options::DEPTH_SCALE;
-use bokehcam_media::recording::depth_file::{DepthFile, DepthInside, Distances, read_inside};
+use bokehcam_media::recording::depth_file::{DepthFile, DepthInside, Distances, has_other_view, read_inside};
 use bokehcam_media::recording::still;
 
 /// Extracts the depth inside the photo.
@@ -19,6 +19,13 @@ pub(super) fn extract(command: &DepthCommand, global: &Global) -> Result<(), Cli
     let (photo, out) = (&command.left, &command.out);
     let size = still::read_color(photo)?.size();
     let Some(DepthInside { depth, kind, .. }) = read_inside(photo, size)? else {
+        if has_other_view(photo) {
+            return Err(CliError::Usage(format!(
+                "{0}: there is no depth inside, but a picture of another camera; take both out, and give them as left and \
+                 right: exiftool -b -mpimage2 {0} >right.jpg",
+                photo.display()
+            )));
+        }
         return Err(CliError::Usage(format!(
             "{}: there is no depth inside; give the picture of the right camera, too, or depth by a network: render \
              PHOTO --depth mono",

@@ -155,7 +155,7 @@ fn what_is_not_understood_is_answered_in_the_words_of_who_asked() {
         (&["render", "photo.png", "--out", "o.png", "--backend", "cuda"], 2, "[possible values: auto, gpu, cpu]"),
         (&["render", "photo.png", "--out", "o.png", "--depth", "mate"], 2, "did you mean matte?"),
         (&["render", "photo.png", "--out", "o.png", "--depth-unit", "cm"], 2, "millimetres, scale:N"),
-        (&["render", "text.png", "--out", "o.png"], 1, "text.png: not a PNG, JPEG, TIFF, WebP, BMP or GIF file"),
+        (&["render", "text.png", "--out", "o.png"], 1, "text.png: not a PNG, JPEG, TIFF, WebP, BMP, PNM or GIF file"),
         (&["render", "photo.png", "--out", "o.xyz"], 2, "--out o.xyz: no format is known for this name; end it with"),
         (&["render", "photo.png", "--out", "o.gif"], 2, "--out o.gif: no format is known"),
         (&["render", "photo.png", "--out", "o"], 2, "--out o: no format is known"),

@@ -37,6 +37,11 @@ pub fn read_inside(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>
     read(path, color).map_err(RecordingError::picture(path))
 }
 
+/// Returns whether a photo holds the picture of another camera beside its own (a Multi-Picture file).
+pub fn has_other_view(path: &Path) -> bool {
+    embedded::has_other_view(path).unwrap_or(false)
+}
+
 fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFault> {
     let Some(found) = embedded::read(path)? else { return Ok(None) };
     // Map, original and focus belong to the picture as stored; HEIC is upright once it is converted.

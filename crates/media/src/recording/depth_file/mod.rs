@@ -17,7 +17,7 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
-pub use inside::{DepthInside, read_inside};
+pub use inside::{DepthInside, has_other_view, read_inside};
 pub(super) use stated::scale_beside;
 pub use unit::DepthUnit;
 pub(crate) use values::has_colors;

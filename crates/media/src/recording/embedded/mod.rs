@@ -140,6 +140,12 @@ pub fn read(path: &Path) -> Result<Option<EmbeddedDepth>, PictureFault> {
     of_converted(&heif::convert(path)?)
 }
 
+/// Returns whether a file has the picture of another camera.
+pub fn has_other_view(path: &Path) -> Result<bool, PictureFault> {
+    let (file, _) = coded::read_whole(path)?;
+    Ok(multi_picture::pictures(&file).any(|listed| listed.is_other_view()))
+}
+
 /// Returns the depth of a HEIC picture.
 pub(super) fn of_converted(converted: &heif::Converted) -> Result<Option<EmbeddedDepth>, PictureFault> {
     let Some(depth) = &converted.depth else { return Ok(None) };

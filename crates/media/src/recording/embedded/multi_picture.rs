@@ -13,6 +13,8 @@ const ENTRIES_TAG: u16 = 0xB002;
 const ENTRY_BYTES: usize = 16;
 /// The bits of an entry's first word that say what its picture is; 0 is undefined, as phones write for depth and others.
 const KIND_BITS: usize = 0xFF_FFFF;
+/// The kind of pictures from several viewpoints.
+const DISPARITY_KIND: usize = 0x02_0002;
 /// Maximum number of pictures that are looked at; phones write about ten.
 const MAX_PICTURES: usize = 16;
 
@@ -20,14 +22,19 @@ const MAX_PICTURES: usize = 16;
 pub(super) struct Listed<'a> {
     /// Its bytes; `None` if no picture is there: programs that keep only the first one often leave the index.
     pub picture: Option<&'a [u8]>,
-    /// Whether it has a kind of its own: a thumbnail, or another view. Those are whole pictures, and no maps.
-    has_kind: bool,
+    /// 0 if it is undefined. Others are whole pictures, and no maps: a thumbnail, or another view.
+    kind: usize,
 }
 
 impl Listed<'_> {
     /// Returns whether it may be depth, and is missing.
     pub(super) fn is_lost_map(&self) -> bool {
-        self.picture.is_none() && !self.has_kind
+        self.picture.is_none() && self.kind == 0
+    }
+
+    /// Returns whether it is the picture of another camera.
+    pub(super) fn is_other_view(&self) -> bool {
+        self.kind == DISPARITY_KIND
     }
 }
 
@@ -43,7 +50,7 @@ pub(super) fn pictures(file: &[u8]) -> impl Iterator<Item = Listed<'_>> {
         // Positions count from the byte after the identifier.
         let start = origin.saturating_add(offset);
         let picture = file.get(start..start.saturating_add(size)).filter(|picture| is_picture(picture));
-        Listed { picture, has_kind: kind != 0 }
+        Listed { picture, kind }
     })
 }
 
