@@ -9,7 +9,7 @@ use super::decode::{self, Scratch};
 use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::upright::upright;
-use super::{Recording, coded, pfm};
+use super::{Recording, coded, luma, pfm};
 use bokehcam::calibration::registration::{Registration, RgbdCalibration};
 use bokehcam::frame::DepthMap;
 
@@ -109,7 +109,7 @@ impl Recording {
                         decode::read_depth(&path, *units, Some(stored_size), scratch, into)
                     }
                     DepthFormat::Inverse { white_is_far } => {
-                        decode::read_inverse_depth(&path, *white_is_far, stored_size, scratch, into)
+                        luma::read_inverse_depth(&path, *white_is_far, stored_size, scratch, into)
                     }
                     DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, stored_size, scratch, into),
                 };

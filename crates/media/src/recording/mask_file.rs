@@ -6,11 +6,12 @@ use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 
 use super::coded::{self, EncodedPicture};
-use super::decode::{self, LumaPixel, Scratch};
+use super::decode::Scratch;
 use super::depth_file::{describe_stretch, is_stretchable};
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::FileKind;
+use super::luma::{self, LumaPixel};
 use super::upright::upright;
 use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
@@ -87,7 +88,7 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
     let (mut unequal, mut colored) = (0, 0);
     let white = if samples.is_16bit { 65535.0 } else { 255.0 };
     let is_jpeg = coded::read_kind(path) == Some(FileKind::Jpeg);
-    let mut metadata = decode::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
+    let mut metadata = luma::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
         let LumaPixel { luma, alpha, is_colored } = pixel;
         grey[at] = luma * alpha;
         if let Some(place) = alphas.get_mut(at) {

@@ -36,6 +36,7 @@ pub mod jpeg_repair;
 mod kinect;
 mod kitti;
 mod list;
+mod luma;
 pub mod map_sequence;
 mod middlebury;
 mod options;

@@ -16,7 +16,7 @@ use super::file_kind::{self, FileKind};
 pub use super::photo_metadata::PhotoFormat;
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
-use super::{check_depth_scale, coded, decode, depth_covers, encode, pfm, tiff_file};
+use super::{check_depth_scale, coded, decode, depth_covers, encode, luma, pfm, tiff_file};
 use crate::files::atomic_file;
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
@@ -89,7 +89,7 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap> {
 /// # Errors
 /// Same as for [`read_color`].
 pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>)> {
-    decode::read_grey(path).map_err(RecordingError::picture(path))
+    luma::read_grey(path).map_err(RecordingError::picture(path))
 }
 
 /// Reads the picture of an aperture, as [`read_grey`].

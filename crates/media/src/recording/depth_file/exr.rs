@@ -11,24 +11,24 @@ use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
 
+use super::layers::{self, Choice};
 use super::values::{ColorCount, Samples, Values};
 use crate::recording::MAX_PIXELS;
 use crate::recording::decoders::check_size;
 use crate::recording::fault::PictureFault;
-use crate::recording::role::Role;
 
 /// Most samples in a layer, which are decompressed to find those of one channel: a hundred channels of 19 megapixels.
 const MAX_SAMPLES: u64 = 16 * MAX_PIXELS;
 /// Most bytes in a block, a tile or some rows of all channels: the decoder has memory for some blocks.
 const MAX_BLOCK_BYTES: usize = 256 << 20;
 
-/// Reads the layer with depth that [`choose`] chooses, block by block, and no other one.
+/// Reads the layer with depth that [`layers::choose`] chooses, block by block, and no other one.
 pub(super) fn read(file: File) -> Result<Values, PictureFault> {
     let reader = block::read(BufReader::new(file), false).map_err(fault)?;
     for header in reader.headers() {
         check_side(header)?;
     }
-    let Choice { layer, channels: wanted, note } = choose(reader.headers())
+    let Choice { layer, channels: wanted, note } = layers::choose(reader.headers())
         .ok_or_else(|| PictureFault::NotAMap("an EXR without a layer of depth (Z, or one named depth)".to_owned()))?;
     let header = &reader.headers()[layer].clone();
     let size = check_side(header)?;
@@ -90,59 +90,6 @@ fn place_in_display(header: &Header, numbers: Vec<f32>) -> Result<((u32, u32), V
         }
     }
     Ok((size, placed))
-}
-
-/// The layer and the channel with depth, and channels that must be equal to it.
-struct Choice {
-    layer: usize,
-    channels: Vec<usize>,
-    note: Option<String>,
-}
-
-/// Chooses by meaning: a scalar whose name or layer says depth, above all the standard's `Z` and then the plainest name;
-/// else a scalar that is grey, or else colours, which are depth if they are equal. A channel with others of its vector (the
-/// z of a normal) is no scalar.
-fn choose(headers: &[Header]) -> Option<Choice> {
-    let candidates = headers.iter().enumerate().filter(|(_, header)| !header.deep).flat_map(|(layer, header)| {
-        let channels = &header.channels.list;
-        channels.iter().enumerate().filter_map(move |(at, channel)| {
-            let name = channel.name.to_string();
-            let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
-            let beside = |letter: &str| {
-                let other = if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
-                channels.iter().position(|channel| channel.name.to_string().eq_ignore_ascii_case(&other))
-            };
-            let letter = last.to_ascii_uppercase();
-            let part = header.own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
-            let role = match Role::of_name(&format!("{part} {prefix}")) {
-                Role::Unstated => Role::of_name(last),
-                stated => stated,
-            };
-            let all = |letters: &[&str]| letters.iter().map(|letter| beside(letter)).collect::<Option<Vec<_>>>();
-            let (is_scalar, others) = match &*letter {
-                "X" | "Y" | "Z" => (all(&["X", "Y"]).is_none(), Vec::new()),
-                "R" => (true, all(&["G", "B"]).unwrap_or_default()),
-                "G" | "B" | "A" => (false, Vec::new()),
-                _ => (true, Vec::new()),
-            };
-            let is_usual = ["Z", "V", "Y", "R", "X"].contains(&&*letter);
-            let rank = match role {
-                Role::Depth if prefix.is_empty() && part.is_empty() && letter == "Z" => 0,
-                Role::Depth => 1 + Role::count_other_words(prefix).min(7),
-                Role::Unstated if is_usual => 8 + usize::from(letter == "R"),
-                _ => return None,
-            };
-            is_scalar.then(|| (rank, layer, [vec![at], others].concat(), format!("{part} {name}").trim().to_owned()))
-        })
-    });
-    let mut candidates: Vec<_> = candidates.collect();
-    // Stable: of equals, the first.
-    candidates.sort_by_key(|(rank, ..)| *rank);
-    let equals = candidates.iter().filter(|(rank, ..)| *rank == candidates[0].0).count();
-    let (_, layer, channels, name) = candidates.into_iter().next()?;
-    let note =
-        (equals > 1).then(|| format!("has {equals} layers that may be the depth, of which {name} is taken, the first"));
-    Some(Choice { layer, channels, note })
 }
 
 /// Reads the samples of a line as floats.

@@ -5,6 +5,7 @@ mod color_map;
 mod exr;
 mod fit;
 mod inside;
+mod layers;
 mod meaning;
 mod npy;
 mod stated;
