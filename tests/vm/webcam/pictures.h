@@ -153,3 +153,26 @@ static void generate_yuyv(struct picture *p, int width, int height, long number)
         for (int i = 1; i < 8; i++) memcpy(row + (size_t)i * width * 2, row, width * 2);
     }
 }
+static void generate_nv12(struct picture *p, int width, int height, long number) {
+    size_t luma = (size_t)width * height;
+    p->length = luma * 3 / 2;
+    p->bytes = realloc(p->bytes, p->length);
+    for (int by = 0; by < height / 8; by++)
+        for (int bx = 0; bx < width / 8; bx++) {
+            int y, u, v;
+            scene(bx, by, width / 8, number, &y, &u, &v);
+            for (int row = by * 8; row < by * 8 + 8; row++) memset(p->bytes + (size_t)row * width + bx * 8, y, 8);
+            for (int row = by * 4; row < by * 4 + 4; row++)
+                for (int i = 0; i < 4; i++) memcpy(p->bytes + luma + (size_t)row * width + bx * 8 + i * 2, (uint8_t[]){u, v}, 2);
+        }
+}
+// An access unit that holds its delimiter and filler data, and no picture.
+static void generate_h264(struct picture *p, int width, int height, long number) {
+    static const uint8_t head[] = {0, 0, 0, 1, 0x09, 0x10, 0, 0, 0, 1, 0x0c};
+    (void)width, (void)height, (void)number;
+    p->length = 2000;
+    p->bytes = realloc(p->bytes, p->length);
+    memset(p->bytes, 0xff, p->length);
+    memcpy(p->bytes, head, sizeof head);
+    p->bytes[p->length - 1] = 0x80;
+}

@@ -1,6 +1,6 @@
 // Part of webcam.c: descriptors, and the requests of the USB Video Class.
 
-static uint8_t config[1024];
+static uint8_t config[2048];
 static size_t config_length;
 static void d(const uint8_t *bytes, size_t count) {
     memcpy(config + config_length, bytes, count);
@@ -10,18 +10,18 @@ static void d(const uint8_t *bytes, size_t count) {
 #define W(x) (uint8_t)(x), (uint8_t)((x) >> 8)
 #define L(x) W(x), W((uint32_t)(x) >> 16)
 
-static uint32_t largest(int kind, struct size s) {
-    return kind == YUYV ? s.width * s.height * 2 : s.width * s.height * 2;
-}
+// Bytes of a picture at most: the length of a raw one, a generous one for the others.
+static uint32_t largest(int kind, struct size s) { return s.width * s.height * (kind == NV12 ? 3 : 4) / 2; }
 static void choose_formats(const char *text) {
     format_count = 0;
     char copy[256], *rest, *inner;
     snprintf(copy, sizeof copy, "%s", text);
-    for (char *word = strtok_r(copy, ",", &rest); word && format_count < 2; word = strtok_r(NULL, ",", &rest)) {
+    for (char *word = strtok_r(copy, ",", &rest); word && format_count < KINDS; word = strtok_r(NULL, ",", &rest)) {
         struct format *f = &formats[format_count++];
         char *part = strtok_r(word, ":", &inner);
-        *f = (struct format){.kind = !strcmp(part, "yuyv") ? YUYV : MJPEG};
-        if (f->kind == MJPEG && strcmp(part, "mjpeg")) errno = EINVAL, die("--formats");
+        *f = (struct format){0};
+        while (f->kind < KINDS && strcasecmp(part, KIND_NAMES[f->kind])) f->kind++;
+        if (f->kind == KINDS) errno = EINVAL, die("--formats");
         while ((part = strtok_r(NULL, ":", &inner)) && f->count < 4) {
             struct size *one = &f->sizes[f->count++];
             if (sscanf(part, "%dx%d", &one->width, &one->height) != 2 || one->width % 16 || one->height % 8 || one->width < 144)
@@ -38,8 +38,8 @@ static void choose_formats(const char *text) {
     D(18, 0x24, 2, 1, W(0x0201), 0, 0, 0, 0, 0, 0, 0, 0, 3, 0x0e, 0, 0);
     D(12, 0x24, 5, 2, 1, W(0), 2, W(0x164b), 0, 0);
     D(9, 0x24, 3, 3, W(0x0101), 0, 2, 0);
-    // Video streaming, with its only setting.
-    D(9, 4, 1, 0, 1, 0x0e, 2, 0, 0);
+    // Video streaming: the only setting of a bulk camera, the silent one of an isochronous camera.
+    D(9, 4, 1, 0, !isochronous, 0x0e, 2, 0, 0);
     size_t header = config_length;
     D(13, 0x24, 1, format_count, W(0), 0x80 | STREAM_EP, 0, 3, 0, 0, 0, 1);
     for (int i = 0; i < format_count; i++) D(0);
@@ -47,20 +47,32 @@ static void choose_formats(const char *text) {
     for (int i = 0; i < format_count; i++) {
         struct format *f = &formats[i];
         if (f->kind == MJPEG) D(11, 0x24, 6, i + 1, f->count, 1, 1, 0, 0, 0, 0);
-        else
-            D(27, 0x24, 4, i + 1, f->count, 'Y', 'U', 'Y', '2', 0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71, 16, 1, 0,
-              0, 0, 0);
+        else {
+            D(f->kind == H264 ? 28 : 27, 0x24, f->kind == H264 ? 0x10 : 4, i + 1, f->count);
+            d((const uint8_t *)GUIDS[f->kind], 4);
+            D(0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71, f->kind == NV12 ? 12 : 16, 1, 0, 0, 0, 0);
+            // The pictures differ in length.
+            if (f->kind == H264) D(1);
+        }
         for (int k = 0; k < f->count; k++) {
             struct size s = f->sizes[k];
             uint32_t bits = largest(f->kind, s) * 8;
-            D(26 + 4 * rate_count, 0x24, f->kind == MJPEG ? 7 : 5, k + 1, 0, W(s.width), W(s.height), L(bits * 5), L(bits * 30),
-              L(largest(f->kind, s)), L(10000000 / rates[0]), rate_count);
+            D(26 + 4 * rate_count, 0x24, f->kind == MJPEG ? 7 : f->kind == H264 ? 0x11 : 5, k + 1, 0, W(s.width), W(s.height),
+              L(bits * 5), L(bits * 30));
+            if (f->kind != H264) D(L(largest(f->kind, s)));
+            D(L(10000000 / rates[0]), rate_count);
+            // Bytes in a row, which compressed pictures do not have.
+            if (f->kind == H264) D(L(0));
             for (int r = 0; r < rate_count; r++) D(L(10000000 / rates[r]));
         }
         D(6, 0x24, 0x0d, 1, 1, 4);
     }
     memcpy(config + header + 4, (uint8_t[]){W(config_length - header)}, 2);
-    D(7, 5, 0x80 | STREAM_EP, 2, W(512), 0);
+    if (!isochronous) D(7, 5, 0x80 | STREAM_EP, 2, W(512), 0);
+    for (int setting = 1; isochronous && setting < SETTINGS; setting++) {
+        D(9, 4, 1, setting, 1, 0x0e, 2, 0, 0);
+        D(7, 5, 0x80 | STREAM_EP, 5, W(max_packet_size(setting)), 1);
+    }
     memcpy(config + 2, (uint8_t[]){W(config_length)}, 2);
 }
 
@@ -126,16 +138,25 @@ static struct probe settle(struct probe p) {
     p.interval = best;
     return p;
 }
+// As after plugging in and after a reset, when the kernel looks for a driver.
+static bool node_known;
+static void forget(void) {
+    node_known = false;
+    probed = committed = settle((struct probe){1, 1, 0});
+    for (size_t i = 0; i < CONTROLS; i++) controls[i].now = controls[i].preset;
+}
+static long payload_bytes(void) { return payload_max ? payload_max : 16384; }
 static size_t write_probe(struct probe p, uint8_t *to) {
     struct format *f = &formats[p.format - 1];
+    uint32_t picture_max = largest(f->kind, f->sizes[p.frame - 1]);
+    // Compressed pictures have a fourth of that; a rate is 100 ns over an interval.
+    long sent = picture_max / (f->kind == MJPEG || f->kind == H264 ? 4 : 1);
+    uint32_t payload = isochronous && !payload_max ? reserved_bytes(sent * (10000000 / p.interval)) : payload_bytes();
     uint8_t bytes[34] = {W(1), p.format, p.frame, L(p.interval), W(0), W(0), W(0), W(0), W(50),
-                         L(largest(f->kind, f->sizes[p.frame - 1])), L(payload_max), L(CLOCK_HZ), 3, 1, 1, 1};
+                         L(picture_max), L(payload), L(CLOCK_HZ), 3, 1, 1, 1};
     memcpy(to, bytes, sizeof bytes);
     return sizeof bytes;
 }
-
-static void start_stream(void);
-static void stop_stream(const char *why);
 
 static int fail(int code) {
     last_error = code;
@@ -153,7 +174,7 @@ static int class_request(const uint8_t *setup, uint8_t *data, int length) {
                 if (length < 26) return fail(8);
                 if (selector == 2 && busy) return fail(1);
                 *target = settle((struct probe){data[2], data[3], data[4] | data[5] << 8 | data[6] << 16 | data[7] << 24});
-                if (selector == 2) start_stream();
+                if (selector == 2 && !isochronous) start_stream();
                 return length;
             case GET_CUR: return write_probe(settle(*target), data);
             case GET_MIN:
@@ -213,8 +234,11 @@ static int control_request(const uint8_t *setup, uint8_t *data, int length) {
         case 0x8200: return data[0] = data[1] = 0, 2;
         case 0x8008: return data[0] = 1, 1;
         case 0x810a: return data[0] = 0, 1;
-        case 0x0009: return 0;
-        case 0x010b: return value ? -EPIPE : 0;
+        case 0x0009:
+            stop_stream("configured");
+            forget();
+            return 0;
+        case 0x010b: return index == 1 ? choose_setting(value) : value ? -EPIPE : 0;
         case 0x0001:
         case 0x0003: return 0;
         case 0x0201:

@@ -3,7 +3,8 @@
 static int line = -1, port = -1;
 static struct wanted {
     uint32_t seqnum;
-    int length;
+    int length, packet_count;
+    struct packet packets[PACKETS];
 } wanted[64];
 static int wanted_count;
 
@@ -37,17 +38,28 @@ static bool receive_all(void *bytes, size_t count) {
     }
     return true;
 }
-// Completes a transfer; in one write, with what it brings.
-static void complete(uint32_t seqnum, int status, const void *data, int length, int actual) {
+// Completes a transfer; in one write, with what it brings: the bytes, and of an isochronous one its packets, of which `errors`
+// failed.
+static uint32_t microframe;
+static void answer(struct wanted *w, int status, const void *data, int length, int actual, int errors) {
     static uint8_t *buffer;
-    buffer = realloc(buffer, sizeof(struct header) + length);
-    struct header h = {.command = htobe32(RET_SUBMIT), .seqnum = htobe32(seqnum)};
+    size_t packets = w->packet_count * sizeof *w->packets;
+    buffer = realloc(buffer, sizeof(struct header) + length + packets);
+    struct header h = {.command = htobe32(RET_SUBMIT), .seqnum = htobe32(w->seqnum)};
     h.u.ret.status = htobe32(status);
     h.u.ret.length = htobe32(actual);
-    h.u.ret.packets = htobe32(-1);
+    h.u.ret.start_frame = htobe32(microframe);
+    h.u.ret.packets = htobe32(w->packet_count ? w->packet_count : -1);
+    h.u.ret.errors = htobe32(errors);
     memcpy(buffer, &h, sizeof h);
     if (length) memcpy(buffer + sizeof h, data, length);
-    send_all(buffer, sizeof h + length);
+    memcpy(buffer + sizeof h + length, w->packets, packets);
+    microframe += w->packet_count;
+    send_all(buffer, sizeof h + length + packets);
+}
+static void complete(uint32_t seqnum, int status, const void *data, int length, int actual) {
+    struct wanted w = {.seqnum = seqnum};
+    answer(&w, status, data, length, actual, 0);
 }
 
 static void receive(void) {
@@ -65,15 +77,18 @@ static void receive(void) {
                 break;
             }
         if (verbose) say("unlink %u: %d", target, status);
-        struct header answer = {.command = htobe32(RET_UNLINK), .seqnum = htobe32(seqnum)};
-        answer.u.ret.status = htobe32(status);
-        send_all(&answer, sizeof answer);
+        struct header done = {.command = htobe32(RET_UNLINK), .seqnum = htobe32(seqnum)};
+        done.u.ret.status = htobe32(status);
+        send_all(&done, sizeof done);
         return;
     }
     int length = be32toh(h.u.submit.length);
     if (ep == STREAM_EP && in) {
-        if (wanted_count == 64) return complete(seqnum, -ENOMEM, NULL, 0, 0);
-        wanted[wanted_count++] = (struct wanted){seqnum, length};
+        int packets = isochronous ? (int)be32toh(h.u.submit.packets) : 0;
+        if (wanted_count == 64 || packets > PACKETS) return unplugged("too much is asked of it");
+        struct wanted *w = &wanted[wanted_count];
+        *w = (struct wanted){.seqnum = seqnum, .length = length, .packet_count = packets};
+        if (receive_all(w->packets, packets * sizeof *w->packets)) wanted_count++;
         return;
     }
     static uint8_t data[65536 + 1024];
@@ -104,13 +119,13 @@ static struct picture picture;
 static size_t picture_at;
 static bool in_picture;
 static uint32_t picture_pts;
-static bool picture_err;
+static bool picture_err, to_lose;
 
 static void start_stream(void) {
     struct format *f = &formats[committed.format - 1];
     struct size s = f->sizes[committed.frame - 1];
     period = committed.interval * 1e-7;
-    say("stream %s %dx%d at %.2f", f->kind == MJPEG ? "MJPEG" : "YUYV", s.width, s.height, 1 / period);
+    say("stream %s %dx%d at %.2f", KIND_NAMES[f->kind], s.width, s.height, 1 / period);
     streaming = true, halted = false, in_picture = false;
     number = sent_pictures = skipped = 0;
     due = now() + period;
@@ -125,8 +140,8 @@ static void begin_picture(void) {
     struct format *f = &formats[committed.format - 1];
     struct size s = f->sizes[committed.frame - 1];
     static struct picture made;
-    if (f->kind == YUYV) {
-        generate_yuyv(&made, s.width, s.height, number);
+    if (f->kind != MJPEG) {
+        (f->kind == YUYV ? generate_yuyv : f->kind == NV12 ? generate_nv12 : generate_h264)(&made, s.width, s.height, number);
         picture = made;
     } else {
         if (every(stray) && f->count > 1) s = f->sizes[committed.frame % f->count];
@@ -162,40 +177,73 @@ static void begin_picture(void) {
     if (every(cut)) picture.length /= 2;
     if (every(empty)) picture.length = 0;
     picture_err = every(err);
+    to_lose = every(lose);
     picture_at = 0;
     picture_pts = (uint32_t)(uint64_t)(now() * CLOCK_HZ);
     in_picture = true;
     if (first_picture < 0) first_picture = now();
 }
 
-// One payload for one transfer: a header, and as much of the picture as fits. (A payload may be larger than a transfer; then
-// the transfers after the first have no header.)
+// Writes a payload's header and returns its length. Sets how many bytes of the picture belong to the payload, if that has at
+// most `room` bytes.
+static size_t begin_payload(uint8_t *to, size_t room, size_t *body) {
+    size_t header = scr ? 12 : 6;
+    *body = picture.length - picture_at;
+    if (*body > room - header) *body = room - header;
+    bool last = picture_at + *body == picture.length;
+    uint8_t bits = 0x80 | 0x04 | frame_bit | (last && !no_eof ? 2 : 0) | (picture_err ? 0x40 : 0) | (scr ? 0x08 : 0);
+    uint64_t t = (uint64_t)(now() * CLOCK_HZ);
+    memcpy(to, (uint8_t[]){header, bits, L(picture_pts), L(t), W((uint64_t)(now() * 1000) & 0x7ff)}, header);
+    return header;
+}
+// Writes the picture's next bytes, and ends the picture if they are the last.
+static size_t copy_picture(uint8_t *to, size_t body) {
+    memcpy(to, picture.bytes + picture_at, body);
+    picture_at += body;
+    if (picture_at == picture.length) {
+        in_picture = false;
+        frame_bit ^= 1;
+        number++, sent_pictures++, since_plug++;
+    }
+    return body;
+}
+
+// A bulk transfer: one payload for one transfer. (A payload may be larger than a transfer; then the transfers after the first
+// have no header.)
 static size_t payload_left;
+static size_t fill_transfer(struct wanted *w, uint8_t *buffer) {
+    size_t at = 0;
+    if (payload_left == 0) at = begin_payload(buffer, payload_bytes(), &payload_left);
+    size_t body = payload_left < w->length - at ? payload_left : w->length - at;
+    payload_left -= body;
+    return at + copy_picture(buffer + at, body);
+}
+// An isochronous transfer: one payload in each packet. After the picture they are empty. Sets how many were lost.
+static size_t fill_packets(struct wanted *w, uint8_t *buffer, int *lost) {
+    size_t at = 0;
+    for (int i = 0; i < w->packet_count; i++) {
+        struct packet *p = &w->packets[i];
+        size_t length = 0, body;
+        if (in_picture) {
+            length = begin_payload(buffer + at, be32toh(p->length), &body);
+            length += copy_picture(buffer + at + length, body);
+        }
+        bool is_lost = in_picture && to_lose && picture_at > picture.length / 2;
+        if (is_lost) length = 0, to_lose = false, ++*lost;
+        p->actual_length = htobe32(length);
+        p->status = htobe32(is_lost ? -EXDEV : 0);
+        at += length;
+    }
+    return at;
+}
 static void fill(void) {
     struct wanted w = wanted[0];
     memmove(wanted, wanted + 1, --wanted_count * sizeof *wanted);
     static uint8_t *buffer;
     buffer = realloc(buffer, w.length);
-    size_t room = w.length, at = 0;
-    if (payload_left == 0) {
-        size_t header = scr ? 12 : 6, body = picture.length - picture_at;
-        if (body > payload_max - header) body = payload_max - header;
-        bool last = picture_at + body == picture.length;
-        uint8_t bits = 0x80 | 0x04 | frame_bit | (last && !no_eof ? 2 : 0) | (picture_err ? 0x40 : 0) | (scr ? 0x08 : 0);
-        uint64_t t = (uint64_t)(now() * CLOCK_HZ);
-        memcpy(buffer, (uint8_t[]){header, bits, L(picture_pts), L(t), W((uint64_t)(now() * 1000) & 0x7ff)}, header);
-        at = header;
-        payload_left = body;
-    }
-    size_t body = payload_left < room - at ? payload_left : room - at;
-    memcpy(buffer + at, picture.bytes + picture_at, body);
-    picture_at += body, payload_left -= body, at += body;
-    complete(w.seqnum, 0, buffer, at, at);
-    if (picture_at == picture.length && payload_left == 0) {
-        in_picture = false;
-        frame_bit ^= 1;
-        number++, sent_pictures++, since_plug++;
-    }
+    int lost = 0;
+    size_t length = w.packet_count ? fill_packets(&w, buffer, &lost) : fill_transfer(&w, buffer);
+    answer(&w, 0, buffer, length, length, lost);
 }
 
 // Sends what is due. Returns the seconds until there is more to do, or a negative number: nothing.
@@ -206,7 +254,7 @@ static double work(void) {
     if (halt >= 0 && since >= halt) halted = true, halt = -1, say("the endpoint fails");
     if (halted) {
         while (wanted_count && line >= 0) {
-            complete(wanted[0].seqnum, -EPIPE, NULL, 0, 0);
+            answer(&wanted[0], -EPIPE, NULL, 0, 0, 0);
             memmove(wanted, wanted + 1, --wanted_count * sizeof *wanted);
         }
         return -1;

@@ -1,11 +1,13 @@
 // A USB webcam that is a program: it plugs itself into the kernel's vhci-hcd (USB over IP) through a pair of sockets, and
-// answers like a USB Video Class camera with a bulk endpoint. Linux's own uvcvideo then makes /dev/videoN of it.
+// answers like a USB Video Class camera with a bulk or an isochronous endpoint. Linux's own uvcvideo then makes /dev/videoN
+// of it.
 // Needs root, and the modules vhci-hcd and uvcvideo. `uvc_webcam --help` tells the rest.
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <endian.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/usbdevice_fs.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -14,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -22,15 +25,18 @@
 static const char USAGE[] =
     "uvc_webcam [OPTION...] [FILE.jpg|FOLDER...]: plugs in a webcam until SIGTERM, or until stdin says quit\n"
     "Pictures are sent in a loop, those of the size that was agreed on; without any, generated ones are.\n"
-    "  --formats LIST           what the camera offers, in this order (default: mjpeg:640x480:1280x720,yuyv:640x480);\n"
+    "  --formats LIST           what the camera offers of mjpeg, yuyv, nv12 and h264 (which holds no picture), in this order\n"
+    "                           (default: mjpeg:640x480:1280x720,yuyv:640x480);\n"
     "                           a width must be a multiple of 16 and at least 144, a height one of 8\n"
     "  --name TEXT --serial TEXT\n"
     "  --rates 30,15            frames per second\n"
+    "  --isochronous            the endpoint is isochronous instead of bulk, with alternate settings for its bandwidth\n"
     "Misbehaviour, counted in pictures since the stream started or seconds since the first picture after plugging in:\n"
     "  --cut N                  every Nth picture ends after half of its bytes\n"
     "  --hole N                 every Nth picture lacks 2000 bytes in its middle, as after lost packets (end and size stay right)\n"
     "  --stray N                every Nth JPEG picture has the format's other size\n"
     "  --err N                  every Nth picture has the error bit in its payload headers\n"
+    "  --lose N                 every Nth picture lacks a packet of an isochronous endpoint, and the kernel is told (EXDEV)\n"
     "  --drop N                 every Nth picture is not sent\n"
     "  --empty N                every Nth picture is a header without a byte\n"
     "  --no-eof                 the end of a picture is told by the frame bit (FID) alone\n"
@@ -42,16 +48,19 @@ static const char USAGE[] =
     "  --replug-formats LIST    what it offers after it was plugged in again\n"
     "  --other-port             it comes back at another port, as if put into another socket\n"
     "  --detach                 unplug by /sys/.../detach instead of by closing the socket\n"
-    "  --busy                   refuse to start a stream: the commit request stalls (as for lack of USB bandwidth)\n"
+    "  --busy                   refuse to start a stream: the commit request stalls\n"
+    "  --bandwidth BYTES        of a microframe that other devices left: alternate settings beyond are refused (ENOSPC)\n"
     "  --scr                    source clock in the payload headers (vhci-hcd has no frame numbers to go with it)\n"
-    "  --payload BYTES          at most in one payload, with header (default: 16384)\n"
-    "  --commands               read lines from stdin: unplug, plug, stall, go, halt, cut|hole|stray|err|drop|empty N, quit\n"
+    "  --payload BYTES          at most in one payload, with header (default: 16384; isochronous: the rate's need)\n"
+    "  --commands               read lines from stdin: unplug, plug, stall, go, halt, reset,\n"
+    "                           cut|hole|stray|err|lose|drop|empty N, bandwidth BYTES, quit\n"
     "  --ready COMMAND ARG...   last: run this once the camera has its node, with UVC_WEBCAM=/dev/videoN; end with its exit code\n"
     "  --verbose                every control request\n";
 
 enum { CMD_SUBMIT = 1, CMD_UNLINK, RET_SUBMIT, RET_UNLINK };
 enum { SET_CUR = 0x01, GET_CUR = 0x81, GET_MIN, GET_MAX, GET_RES, GET_LEN, GET_INFO, GET_DEF };
-enum { MJPEG, YUYV };
+enum { MJPEG, YUYV, NV12, H264, KINDS };
+static const char *const KIND_NAMES[] = {"MJPEG", "YUYV", "NV12", "H264"}, *const GUIDS[] = {"", "YUY2", "NV12", "H264"};
 #define VHCI "/sys/devices/platform/vhci_hcd.0/"
 #define CLOCK_HZ 48000000u
 #define STREAM_EP 1
@@ -78,8 +87,8 @@ _Static_assert(sizeof(struct header) == 48, "header");
 // Settings.
 static const char *name = "UVC Test Webcam", *serial = "TEST0001", *formats_text = "mjpeg:640x480:1280x720,yuyv:640x480", *replug_formats;
 static int rates[8] = {30, 15}, rate_count = 2;
-static long cut, hole, stray, err, drop, empty, padding, payload_max = 16384, unplug_times = 1;
-static bool no_eof, no_dht, scr, busy, detach, other_port, commands, verbose;
+static long cut, hole, stray, err, lose, drop, empty, padding, payload_max, bandwidth = 3072, unplug_times = 1;
+static bool isochronous, no_eof, no_dht, scr, busy, detach, other_port, commands, verbose;
 static double stall = -1, stall_for = -1, halt = -1, unplug_after = -1, replug_after = -1;
 
 // What the camera offers: sizes by format, in descriptor order.
@@ -89,7 +98,7 @@ struct size {
 static struct format {
     int kind, count;
     struct size sizes[4];
-} formats[2];
+} formats[KINDS];
 static int format_count;
 
 struct picture {
@@ -120,88 +129,10 @@ static void die(const char *text) {
 }
 
 #include "pictures.h"
+#include "isochronous.h"
 #include "requests.h"
 #include "stream.h"
-
-// ------------------------------------------------------------------------------------------------------------ the plug
-
-static bool write_file(const char *path, const char *text) {
-    int f = open(path, O_WRONLY);
-    bool ok = f >= 0 && write(f, text, strlen(text)) == (ssize_t)strlen(text);
-    int error = errno;
-    if (f >= 0) close(f);
-    errno = error;
-    return ok;
-}
-static int free_port(void) {
-    FILE *f = fopen(VHCI "status", "r");
-    if (!f) die(VHCI "status (is vhci-hcd loaded?)");
-    char text[256], hub[8];
-    unsigned at, state;
-    int found = -1;
-    while (found < 0 && fgets(text, sizeof text, f))
-        if (sscanf(text, "%7s %u %u", hub, &at, &state) == 3 && !strcmp(hub, "hs") && state == 4 && !(other_port && (int)at == port)) found = (int)at;
-    fclose(f);
-    return found;
-}
-// The video node that uvcvideo made: by the serial number, as there may be other cameras.
-static bool read_line(const char *path, char *to, size_t room) {
-    FILE *f = fopen(path, "r");
-    bool ok = f && fgets(to, room, f);
-    if (f) fclose(f);
-    if (ok) to[strcspn(to, "\n")] = 0;
-    return ok;
-}
-static bool find_node(char *to, size_t room) {
-    for (int i = 0; i < 64; i++) {
-        char path[128], text[128];
-        snprintf(path, sizeof path, "/sys/class/video4linux/video%d/index", i);
-        // The second node, index 1, is for metadata.
-        if (!read_line(path, text, sizeof text) || strcmp(text, "0")) continue;
-        snprintf(path, sizeof path, "/sys/class/video4linux/video%d/device/../serial", i);
-        if (!read_line(path, text, sizeof text) || strcmp(text, serial)) continue;
-        snprintf(to, room, "/dev/video%d", i);
-        if (access(to, F_OK) == 0) return true;
-    }
-    return false;
-}
-static bool node_known;
-static void plug(void) {
-    if (line >= 0) return;
-    int pair[2];
-    char text[64];
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair)) die("socketpair");
-    int room = 1 << 20;
-    setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
-    if ((port = free_port()) < 0) errno = EBUSY, die("no free port");
-    snprintf(text, sizeof text, "%d %d %d 3", port, pair[1], 0x00010002);
-    if (!write_file(VHCI "attach", text)) die(VHCI "attach");
-    close(pair[1]);
-    line = pair[0];
-    wanted_count = 0, payload_left = 0, frame_bit = 0, incoming_at = incoming_end = 0, since_plug = 0, first_picture = -1;
-    probed = committed = settle((struct probe){1, 1, 0});
-    for (size_t i = 0; i < CONTROLS; i++) controls[i].now = controls[i].preset;
-    node_known = false;
-    say("plugged into port %d", port);
-}
-static double replug_at = -1;
-static void unplugged(const char *why) {
-    if (line < 0) return;
-    stop_stream(why);
-    close(line);
-    line = -1;
-    say("unplugged (%s) after %ld pictures", why, since_plug);
-}
-static void unplug(const char *why) {
-    char text[16];
-    if (line < 0) return;
-    if (detach) {
-        snprintf(text, sizeof text, "%d", port);
-        if (!write_file(VHCI "detach", text)) say("detach: %s", strerror(errno));
-    }
-    unplugged(why);
-    if (replug_after >= 0) replug_at = now() + replug_after;
-}
+#include "plug.h"
 
 static volatile sig_atomic_t over, child_over;
 static void on_signal(int which) {
@@ -220,10 +151,13 @@ static void obey(char *text) {
     } else if (!strcmp(word, "stall")) held = true;
     else if (!strcmp(word, "go")) held = halted = false;
     else if (!strcmp(word, "halt")) halted = true;
+    else if (!strcmp(word, "reset")) reset();
     else if (!strcmp(word, "cut")) cut = n;
     else if (!strcmp(word, "hole")) hole = n;
     else if (!strcmp(word, "stray")) stray = n;
     else if (!strcmp(word, "err")) err = n;
+    else if (!strcmp(word, "lose")) lose = n;
+    else if (!strcmp(word, "bandwidth")) bandwidth = n;
     else if (!strcmp(word, "drop")) drop = n;
     else if (!strcmp(word, "empty")) empty = n;
     else if (!strcmp(word, "quit")) over = 1;
@@ -238,13 +172,14 @@ int main(int count, char **words) {
 #define VALUE(text, expression) if (!strcmp(w, text)) { if (!next) { fputs(USAGE, stderr); return 2; } expression; i++; continue; }
         if (!strcmp(w, "--help")) return fputs(USAGE, stdout), 0;
         FLAG("--no-eof", no_eof) FLAG("--no-dht", no_dht) FLAG("--scr", scr) FLAG("--busy", busy) FLAG("--detach", detach)
-        FLAG("--other-port", other_port)
+        FLAG("--other-port", other_port) FLAG("--isochronous", isochronous)
         FLAG("--commands", commands) FLAG("--verbose", verbose)
         VALUE("--formats", formats_text = next) VALUE("--name", name = next) VALUE("--serial", serial = next)
         VALUE("--replug-formats", replug_formats = next)
         VALUE("--rates", rate_count = 0; for (char *r = strtok(next, ","); r && rate_count < 8; r = strtok(NULL, ",")) rates[rate_count++] = atoi(r))
         VALUE("--cut", cut = atol(next)) VALUE("--hole", hole = atol(next)) VALUE("--stray", stray = atol(next))
-        VALUE("--err", err = atol(next)) VALUE("--drop", drop = atol(next))
+        VALUE("--err", err = atol(next)) VALUE("--drop", drop = atol(next)) VALUE("--lose", lose = atol(next))
+        VALUE("--bandwidth", bandwidth = atol(next))
         VALUE("--empty", empty = atol(next)) VALUE("--padding", padding = atol(next)) VALUE("--payload", payload_max = atol(next))
         VALUE("--stall", stall = atof(next)) VALUE("--stall-for", stall_for = atof(next)) VALUE("--halt", halt = atof(next))
         VALUE("--unplug-after", unplug_after = atof(next)) VALUE("--replug-after", replug_after = atof(next))
@@ -306,7 +241,6 @@ int main(int count, char **words) {
                 }
             }
         }
-        char node[32];
         if (line >= 0 && !node_known && find_node(node, sizeof node)) {
             node_known = true;
             say("is %s", node);
