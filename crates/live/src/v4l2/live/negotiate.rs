@@ -49,17 +49,28 @@ pub enum NoMode {
     #[error("it offers no picture format; a virtual camera offers one only while something writes to it")]
     Nothing,
     /// No offered format can be read.
-    #[error("it offers {offered}, but only {readable} can be read as {as_what}")]
-    Unreadable { offered: String, as_what: &'static str, readable: String },
-    /// The requested format is not offered.
-    #[error("it does not offer {wanted}; choose --format from {offered}")]
+    #[error("it offers {offered}, but only {readable} can be read as {as_what}{way_out}")]
+    Unreadable { offered: String, as_what: &'static str, readable: String, way_out: &'static str },
+    /// The requested format is not offered, or cannot be read.
+    #[error("{}; choose --format from {offered}", refuse_format(*wanted, *is_offered))]
     Format {
         /// The requested format.
         wanted: FourCc,
+        is_offered: bool,
+        /// What is offered and can be read.
         offered: String,
     },
 }
 
+fn refuse_format(wanted: FourCc, is_offered: bool) -> String {
+    match is_offered {
+        true => format!("{wanted} cannot be read here"),
+        false => format!("it does not offer {wanted}"),
+    }
+}
+
+/// Decodes what this program cannot, such as H.264.
+const BY_FFMPEG: &str = "; let ffmpeg decode it: ffmpeg -f v4l2 -i NODE -f yuv4mpegpipe - | bokehcam stream -";
 /// Used where the request leaves size or rate open.
 const DEFAULT_SIZE_PX: (u32, u32) = (1280, 720);
 const DEFAULT_FPS: f64 = 30.0;
@@ -80,13 +91,18 @@ pub fn rank_modes(modes: &[FormatModes], request: &ModeRequest, link_speed: Link
     if best.is_empty() {
         let offered = join_names(modes.iter().map(|format| format.fourcc));
         let readable_offered = join_names(modes.iter().map(|format| format.fourcc).filter(|fourcc| readable(*fourcc)));
+        let is_foreign = modes.iter().all(|format| format.fourcc.content().is_none());
         return Err(match request.fourcc {
             _ if modes.is_empty() => NoMode::Nothing,
-            Some(wanted) if !readable_offered.is_empty() => NoMode::Format { wanted, offered: readable_offered },
+            Some(wanted) if !readable_offered.is_empty() => {
+                let is_offered = modes.iter().any(|format| format.fourcc == wanted);
+                NoMode::Format { wanted, is_offered, offered: readable_offered }
+            }
             _ => NoMode::Unreadable {
                 offered,
                 as_what: if request.content == Content::Color { "colours" } else { "depth" },
                 readable: join_names(FourCc::supported_formats().filter(|fourcc| readable(*fourcc))),
+                way_out: if request.content == Content::Color && is_foreign { BY_FFMPEG } else { "" },
             },
         });
     }
@@ -300,10 +316,13 @@ mod tests {
             |modes: &[FormatModes], request| rank_modes(modes, &request, LinkSpeed::Fast).unwrap_err().to_string();
         let refused = refusal(&office(), request(None, None, Some(b"NV12")));
         assert_eq!(refused, "it does not offer NV12; choose --format from YUYV, MJPG");
+        let refused = refusal(&office(), request(None, None, Some(b"H264")));
+        assert_eq!(refused, "H264 cannot be read here; choose --format from YUYV, MJPG");
         let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], request(None, None, None));
         assert!(unreadable.starts_with("it offers H264, but only"), "{unreadable}");
+        assert!(unreadable.ends_with("-f yuv4mpegpipe - | bokehcam stream -"), "{unreadable}");
         assert!(refusal(&[], request(None, None, None)).contains("virtual camera"));
         let depth = ModeRequest::for_content(Content::Depth);
-        assert!(refusal(&office(), depth).contains("but only Z16, Y16"));
+        assert!(refusal(&office(), depth).ends_with("but only Z16, Y16 can be read as depth"));
     }
 }
