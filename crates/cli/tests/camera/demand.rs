@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use bokehcam_live::v4l2::holders::list_holders;
 
 use super::machine::{BARS, CAMERA, Machine, Stream, VERSIONS, VIRTUAL, distance_from, frame, open, until, wish};
+use super::webcam::{ISOCHRONOUS, SIZE, Webcam};
 
 fn camera_is_open() -> bool {
     !list_holders(Path::new(CAMERA)).is_empty()
@@ -52,4 +53,27 @@ fn the_camera_is_open_only_while_somebody_watches() {
         let report = stream.report(true);
         assert_eq!(report["frames"]["dropped"]["corrupt"], 0);
     }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_webcam_streams_only_while_somebody_watches() {
+    let webcam = Webcam::plug(&[ISOCHRONOUS]);
+    let asked = format!("{} --size 320x240 --format MJPG --effect none --on-demand", webcam.node);
+    let stream = Stream::show(&asked);
+    webcam.line_with("stream MJPEG");
+    webcam.line_with("stream over");
+    for turn in 0..2 {
+        std::thread::sleep(Duration::from_millis(700));
+        assert_eq!(webcam.lines_with("stream"), 0, "{turn}: it streams for nothing");
+        let mut reader = open(VIRTUAL, wish(SIZE, 15.0, Some("YUYV".parse().unwrap())));
+        webcam.line_with("stream MJPEG");
+        for _ in 0..10 {
+            frame(&mut reader);
+        }
+        assert_eq!(webcam.lines_with("stream"), 0, "{turn}: once for each reader");
+        drop(reader);
+        webcam.line_with("stream over");
+    }
+    stream.report(true);
 }

@@ -21,4 +21,7 @@ mod plate;
 mod program;
 mod two_eyes;
 mod usb;
+mod usb_power;
+mod usb_transfers;
 mod virtual_camera;
+mod webcam;

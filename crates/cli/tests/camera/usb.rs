@@ -1,99 +1,57 @@
-//! The kernel's driver of USB webcams (`uvcvideo`) with an emulated one (`tests/vm/webcam`): its name and formats,
-//! damaged pictures, dim light, and a camera that is unplugged and comes back.
+//! The kernel's driver of USB webcams (`uvcvideo`): the webcam's name and formats, damaged pictures, dim light, and a webcam
+//! that is unplugged and comes back.
 
-use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
-use bokehcam_live::capture::v4l2::V4l2Camera;
-use rustix::process::{Pid, Signal, kill_process};
+use bokehcam::frame::ColorImage;
 
-use super::machine::{HANG, Lost, Machine, frame, open, run, sh, until, wish};
-
-const SIZE: (u32, u32) = (320, 240);
-const FORMATS: &[&str] = &["--formats", "mjpeg:320x240:640x480,yuyv:320x240", "--rates", "15"];
-/// The product's name; the kernel reports `UVC Test Webcam: UVC Test Webca`.
-const NAME: &str = "UVC Test Webcam";
-
-/// A webcam that is plugged in until it is dropped.
-struct Webcam {
-    process: Child,
-    commands: ChildStdin,
-    lines: Receiver<String>,
-    node: String,
-    _machine: Machine,
-}
-
-impl Webcam {
-    /// Plugs one in, and waits for its node.
-    fn plug(options: &[&str]) -> Self {
-        let machine = Machine::new();
-        sh("modprobe -a vhci-hcd uvcvideo");
-        let mut command = Command::new("/run/vm/bin/uvc_webcam");
-        command.args(FORMATS).args(options).arg("--commands").stdin(Stdio::piped()).stdout(Stdio::piped());
-        let mut process = command.spawn().unwrap();
-        let (commands, stdout) = (process.stdin.take().unwrap(), BufReader::new(process.stdout.take().unwrap()));
-        let (told, lines) = mpsc::channel();
-        std::thread::spawn(move || stdout.lines().map_while(Result::ok).try_for_each(|line| told.send(line)));
-        let mut webcam = Self { process, commands, lines, node: String::new(), _machine: machine };
-        webcam.node = webcam.line_with("is /dev/video");
-        webcam
-    }
-
-    /// Waits for a line with this text; returns what follows "is ", which is the node.
-    fn line_with(&self, text: &str) -> String {
-        loop {
-            let line = self.lines.recv_timeout(HANG).unwrap_or_else(|_| panic!("it never said '{text}'"));
-            println!("{line}");
-            if line.contains(text) {
-                return line.rsplit_once("is ").map_or(line.clone(), |(_, node)| node.trim().to_owned());
-            }
-        }
-    }
-
-    /// Has it do something.
-    fn say(&mut self, command: &str) {
-        writeln!(self.commands, "{command}").unwrap();
-    }
-
-    fn open(&self, fourcc: &str) -> V4l2Camera {
-        open(NAME, wish(SIZE, 15.0, Some(fourcc.parse().unwrap())))
-    }
-}
-
-impl Drop for Webcam {
-    fn drop(&mut self) {
-        let _ = kill_process(Pid::from_child(&self.process), Signal::TERM);
-        let _ = self.process.wait();
-        let node = self.node.clone();
-        until("its node is gone", || !Path::new(&node).exists());
-    }
-}
-
-/// Reads `frames` frames of this size; returns the losses.
-fn read(camera: &mut V4l2Camera, frames: usize, size: (u32, u32)) -> Lost {
-    let mut lost = Lost::default();
-    for _ in 0..frames {
-        let (image, before) = frame(camera);
-        assert_eq!(image.size(), size);
-        assert!(image.rgb.iter().any(|&code| code > 30), "it shows something");
-        lost.add(before);
-    }
-    lost
-}
+use super::machine::{frame, run, until};
+use super::webcam::{ISOCHRONOUS, NAME, SIZE, Webcam, read};
 
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn a_webcam_is_listed_by_its_name_and_plays_in_each_of_its_formats() {
-    let webcam = Webcam::plug(&[]);
+    let webcam = Webcam::plug(&["--formats", "mjpeg:320x240:640x480,yuyv:320x240,nv12:320x240"]);
     let listed = run("devices").printed();
     let line = listed.lines().find(|line| line.contains(&format!("{}  ", webcam.node))).expect(&listed);
     assert!(line.contains(&format!("{NAME}  (uvcvideo")) && line.contains("USB 1209:0001, 480 Mbit/s"), "{line}");
-    for fourcc in ["MJPG", "YUYV"] {
+    for fourcc in ["MJPG", "YUYV", "NV12"] {
         assert_eq!(read(&mut webcam.open(fourcc), 15, SIZE).corrupt, 0, "{fourcc}");
     }
+    // Both are encoded from the same luma and chroma; between those of two blocks, chroma may be interpolated.
+    let [yuyv, nv12] = ["YUYV", "NV12"].map(|fourcc| scene_colors(&frame(&mut webcam.open(fourcc)).0));
+    assert!(yuyv.iter().flatten().zip(nv12.iter().flatten()).all(|(a, b)| a.abs_diff(*b) <= 2), "{yuyv:?} {nv12:?}");
+}
+
+/// Returns the colours of the generated scene: along the slope of grey at the top, and in the middle of the square, whose
+/// position depends on the picture's number.
+fn scene_colors(image: &ColorImage) -> Vec<[u8; 3]> {
+    let pixel = |x_px: usize, y_px: usize| {
+        let at = 3 * (y_px * image.size().0 as usize + x_px);
+        [image.rgb[at], image.rgb[at + 1], image.rgb[at + 2]]
+    };
+    let width_px = image.size().0 as usize;
+    let is_red = |x_px: &usize| pixel(*x_px, 96)[0] > pixel(*x_px, 96)[2].saturating_add(60);
+    let square: Vec<usize> = (0..width_px).filter(is_red).collect();
+    assert!(square.len().abs_diff(64) <= 2, "the square is 64 pixels wide: {square:?}");
+    let slope = (4..width_px).step_by(8).map(|x_px| pixel(x_px, 4));
+    slope.chain([pixel(square[square.len() / 2], 96)]).collect()
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn h264_is_named_passed_over_and_refused() {
+    let webcam = Webcam::plug(&["--formats", "h264:320x240,mjpeg:320x240"]);
+    let listed = run(&format!("devices {}", webcam.node)).printed();
+    assert!(listed.contains("MJPG  320x240") && listed.contains("also H264, which cannot be read here"), "{listed}");
+    run(&format!("stream {} --frames 3 --effect none --to null", webcam.node)).done();
+    webcam.line_with("stream MJPEG 320x240");
+    let asked = format!("stream {} --format H264 --frames 3 --to null", webcam.node);
+    run(&asked).refused(1, &["H264 cannot be read here; choose --format from MJPG"]);
+    drop(webcam);
+    let webcam = Webcam::plug(&["--formats", "h264:320x240"]);
+    let way_out = "let ffmpeg decode it: ffmpeg -f v4l2 -i NODE -f yuv4mpegpipe - | bokehcam stream -";
+    run(&format!("stream {} --frames 3 --to null", webcam.node)).refused(1, &["it offers H264, but only", way_out]);
 }
 
 #[test]
@@ -113,15 +71,17 @@ fn damaged_pictures_are_counted_and_never_shown() {
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn a_webcam_that_stalls_fails_or_is_unplugged_goes_on() {
-    let mut webcam = Webcam::plug(&[]);
-    let mut camera = webcam.open("MJPG");
-    read(&mut camera, 5, SIZE);
-    for (fails, mends) in [("stall", Some("go")), ("halt", None), ("unplug", Some("plug")), ("unplug", Some("plug"))] {
-        webcam.say(fails);
-        // Frames that were in flight still come.
-        until("there are no frames", || super::machine::frame_now(&mut camera).is_none());
-        mends.into_iter().for_each(|command| webcam.say(command));
+    for endpoint in [&[][..], &[ISOCHRONOUS]] {
+        let mut webcam = Webcam::plug(endpoint);
+        let mut camera = webcam.open("MJPG");
         read(&mut camera, 5, SIZE);
+        for (fails, mends) in [("stall", Some("go")), ("halt", None), ("unplug", Some("plug")), ("reset", None)] {
+            webcam.say(fails);
+            // Frames that were in flight still come.
+            until("there are no frames", || super::machine::frame_now(&mut camera).is_none());
+            mends.into_iter().for_each(|command| webcam.say(command));
+            read(&mut camera, 5, SIZE);
+        }
     }
 }
 
@@ -143,19 +103,21 @@ fn a_webcam_that_comes_back_without_the_format_is_taken_as_it_is() {
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn a_webcam_that_is_unplugged_at_any_moment_comes_back() {
-    let mut webcam = Webcam::plug(&[]);
-    let mut camera = webcam.open("MJPG");
-    for round in 0_u64..30 {
-        let began = Instant::now();
-        let played = Duration::from_millis(round * 37 % 200);
-        while began.elapsed() < played {
-            super::machine::frame_now(&mut camera);
+    for endpoint in [&[][..], &[ISOCHRONOUS]] {
+        let mut webcam = Webcam::plug(endpoint);
+        let mut camera = webcam.open("MJPG");
+        for round in 0_u64..10 {
+            let began = Instant::now();
+            let played = Duration::from_millis(round * 37 % 200);
+            while began.elapsed() < played {
+                super::machine::frame_now(&mut camera);
+            }
+            webcam.say("unplug");
+            std::thread::sleep(Duration::from_millis(round * 61 % 300));
+            webcam.say("plug");
+            webcam.line_with("is /dev/video");
+            read(&mut camera, 2, SIZE);
         }
-        webcam.say("unplug");
-        std::thread::sleep(Duration::from_millis(round * 61 % 300));
-        webcam.say("plug");
-        webcam.line_with("is /dev/video");
-        read(&mut camera, 2, SIZE);
     }
 }
 
