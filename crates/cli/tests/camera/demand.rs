@@ -59,6 +59,7 @@ fn the_camera_is_open_only_while_somebody_watches() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn a_webcam_streams_only_while_somebody_watches() {
     let webcam = Webcam::plug(&[ISOCHRONOUS]);
+    webcam.machine.loopback(VERSIONS[0]);
     let asked = format!("{} --size 320x240 --format MJPG --effect none --on-demand", webcam.node);
     let stream = Stream::show(&asked);
     webcam.line_with("stream MJPEG");

@@ -48,12 +48,18 @@ impl Machine {
         Self::with(VIVID, VERSIONS[0])
     }
 
-    /// Loads a camera with module arguments, and a virtual camera of a version.
-    pub fn with(vivid: &str, version: &str) -> Self {
+    /// Takes the devices as they are.
+    pub fn alone() -> Self {
         assert!(std::env::var_os("BOKEHCAM_VM").is_some(), "not in the virtual machine: see tests/vm/run");
-        // A failed test poisons the lock, but all its state is reloaded here.
+        // A failed test poisons the lock, but all state that matters is reloaded.
         let machine = Self { _alone: ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) };
         sh(&format!("mkdir -p -m 700 {RUNTIME}"));
+        machine
+    }
+
+    /// Loads a camera with module arguments, and a virtual camera of a version.
+    pub fn with(vivid: &str, version: &str) -> Self {
+        let machine = Self::alone();
         unload("vivid");
         sh(&format!("modprobe vivid {vivid}"));
         machine.loopback(version);

@@ -24,7 +24,7 @@ pub struct Webcam {
     commands: ChildStdin,
     lines: Receiver<String>,
     pub node: String,
-    _machine: Machine,
+    pub machine: Machine,
 }
 
 impl Webcam {
@@ -35,7 +35,7 @@ impl Webcam {
 
     /// Plugs one in with a parameter of the driver.
     pub fn plug_with(parameter: &str, options: &[&str]) -> Self {
-        let machine = Machine::new();
+        let machine = Machine::alone();
         let (name, value) = parameter.split_once('=').unwrap();
         sh(&format!("modprobe -a vhci-hcd uvcvideo && echo {value} > /sys/module/uvcvideo/parameters/{name}"));
         let mut command = Command::new("/run/vm/bin/uvc_webcam");
@@ -44,7 +44,7 @@ impl Webcam {
         let (commands, stdout) = (process.stdin.take().unwrap(), BufReader::new(process.stdout.take().unwrap()));
         let (told, lines) = mpsc::channel();
         std::thread::spawn(move || stdout.lines().map_while(Result::ok).try_for_each(|line| told.send(line)));
-        let mut webcam = Self { process, commands, lines, node: String::new(), _machine: machine };
+        let mut webcam = Self { process, commands, lines, node: String::new(), machine };
         webcam.node = webcam.line_with("is /dev/video");
         webcam
     }
