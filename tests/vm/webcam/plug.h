@@ -41,8 +41,22 @@ static bool find_node(char *to, size_t room) {
     return false;
 }
 static char node[32];
+// Whether the kernel still has the device.
+static bool is_attached(void) {
+    glob_t found;
+    bool attached = false;
+    if (glob("/sys/bus/usb/devices/*/serial", 0, NULL, &found)) return false;
+    for (size_t i = 0; i < found.gl_pathc; i++) {
+        char text[128];
+        attached |= read_line(found.gl_pathv[i], text, sizeof text) && !strcmp(text, serial);
+    }
+    globfree(&found);
+    return attached;
+}
 static void plug(void) {
     if (line >= 0) return;
+    // A port of vhci-hcd that is taken again while the kernel still ends the transfers of the last connection may hang.
+    for (int i = 0; i < 1000 && is_attached(); i++) nanosleep(&(struct timespec){0, 5000000}, NULL);
     int pair[2];
     char text[64];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair)) die("socketpair");

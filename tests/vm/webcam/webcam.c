@@ -7,6 +7,7 @@
 #include <endian.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <glob.h>
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
 #include <signal.h>
