@@ -73,7 +73,7 @@ fn colours_that_are_multiplied_by_alpha_are_divided_again() {
     let dir = TempDir::new().unwrap();
     let path = dir.path().join("a.tif");
     for (extra, expected) in
-        [(ExtraSamples::AssociatedAlpha, [200, 100, 255, 9]), (ExtraSamples::UnassociatedAlpha, [100, 50, 200, 9])]
+        [(ExtraSamples::AssociatedAlpha, [200, 100, 255, 200]), (ExtraSamples::UnassociatedAlpha, [100, 50, 200, 100])]
     {
         let mut file = Vec::new();
         let mut encoder = TiffEncoder::new(Cursor::new(&mut file)).unwrap();
@@ -82,6 +82,7 @@ fn colours_that_are_multiplied_by_alpha_are_divided_again() {
         image.write_data(&[100, 50, 200, 128, 9, 9, 9, 0]).unwrap();
         fs::write(&path, file).unwrap();
         let photo = Photo::read(&path).unwrap();
+        // The second pixel is hidden.
         let found = [0, 1, 2, 3].map(|k| photo.color.rgb[k]);
         let is_near = found.iter().zip(expected).all(|(found, expected): (&u8, u8)| found.abs_diff(expected) <= 1);
         assert!(is_near, "{found:?}");
