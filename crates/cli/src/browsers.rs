@@ -91,11 +91,11 @@ fn find_flags_file(program: &Path) -> Option<PathBuf> {
 pub fn read_features(file: &Path) -> Result<Features, CliError> {
     let text = read_flags(file)?;
     let lines = text.lines().filter(|line| !line.trim_start().starts_with('#'));
-    let enabled = lines.flat_map(str::split_whitespace).filter_map(|word| {
+    let mut enabled = lines.flat_map(str::split_whitespace).filter_map(|word| {
         let quotes = ['"', '\''];
         Some(word.trim_matches(quotes).strip_prefix("--enable-features=")?.trim_matches(quotes))
     });
-    Ok(match enabled.last() {
+    Ok(match enabled.next_back() {
         None => Features::None,
         Some(enabled) if enabled.split(',').any(|feature| feature == FEATURE) => Features::PipeWireCamera,
         Some(_) => Features::Others,

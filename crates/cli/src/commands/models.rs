@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use clap::{Args, Subcommand};
 
 use crate::error::CliError;
+use crate::log;
 use crate::terminal::{print_to_stderr, print_to_stdout};
 use bokehcam_live::source::installed::{installed_networks, model_folders};
 use bokehcam_media::files::{atomic_file, input};
@@ -143,6 +144,8 @@ fn download(known: &KnownNetwork) -> Result<Vec<u8>, CliError> {
     let address = || CliError::io(Path::new(known.address));
     for (client, options) in CLIENTS {
         print_to_stderr(&format!("{client} {} {}", options.join(" "), known.address));
+        // Before what the client itself says.
+        log::flush();
         let mut command = Command::new(client);
         command.args(options).arg(known.address).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = match command.spawn() {

@@ -72,9 +72,10 @@ fn what_cannot_be_shown_as_it_is_is_told() {
 fn what_is_transparent_is_in_front_of_white() {
     let home = Home::new();
     let half = "color=red:s=64x48:r=10:d=0.3,format=rgba,geq=r=255:g=0:b=0:a='if(lt(X,32),255,0)'";
-    for file in ["half.mov", "half.gif"] {
-        let codec: &[&str] = if file == "half.mov" { &["-c:v", "png"] } else { &[] };
-        make(&home, &[&source(half)[..], codec, &[file]].concat());
+    // A palette in which one number is transparent.
+    let paletted = format!("{half},split[a][b];[a]palettegen[p];[b][p]paletteuse");
+    for (file, filter, codec) in [("half.mov", half, &["-c:v", "png"][..]), ("half.gif", &*paletted, &[])] {
+        make(&home, &[&source(filter)[..], codec, &[file]].concat());
         home.run(&["stream", file, "--effect", "none", "--to", "out/", "--force"]).done();
         let picture = read_color(&home.path("out/000001.png")).unwrap();
         let pixel = |x: usize| &picture.rgb[3 * (24 * 64 + x)..][..3];

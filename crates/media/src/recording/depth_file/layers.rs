@@ -24,6 +24,8 @@ struct Candidate<'a> {
     /// The layer within the picture, and the name there: `ViewLayer.Depth` and `Z`.
     prefix: String,
     last: String,
+    /// The name there in capitals, to compare it with those of axes and colours.
+    letter: String,
 }
 
 /// Chooses by meaning: a scalar whose name or layer says depth, above all the standard's `Z` and then the plainest name;
@@ -54,7 +56,14 @@ impl<'a> Candidate<'a> {
     fn new(layer: usize, channel: usize, header: &'a Header) -> Self {
         let name = header.channels.list[channel].name.to_string();
         let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
-        Self { layer, channel, header, prefix: prefix.to_owned(), last: last.to_ascii_uppercase() }
+        Self {
+            layer,
+            channel,
+            header,
+            prefix: prefix.to_owned(),
+            last: last.to_owned(),
+            letter: last.to_ascii_uppercase(),
+        }
     }
 
     /// Returns the name of its part in a file of several.
@@ -68,24 +77,24 @@ impl<'a> Candidate<'a> {
             Role::Unstated => Role::of_name(&self.last),
             stated => stated,
         };
-        let is_standard = self.last == "Z" && self.prefix.is_empty() && self.part().is_empty();
+        let is_standard = self.letter == "Z" && self.prefix.is_empty() && self.part().is_empty();
         match role {
-            _ if self.is_of_vector() || matches!(&*self.last, "G" | "B" | "A") => None,
+            _ if self.is_of_vector() || matches!(&*self.letter, "G" | "B" | "A") => None,
             Role::Depth if is_standard => Some(0),
             Role::Depth => Some(1 + Role::count_other_words(&self.prefix).min(7)),
-            Role::Unstated if ["Z", "V", "Y", "X"].contains(&&*self.last) => Some(9),
-            Role::Unstated if self.last == "R" => Some(10),
+            Role::Unstated if ["Z", "V", "Y", "X"].contains(&&*self.letter) => Some(9),
+            Role::Unstated if self.letter == "R" => Some(10),
             _ => None,
         }
     }
 
     fn is_of_vector(&self) -> bool {
-        ["X", "Y", "Z"].contains(&&*self.last) && self.all_beside(&["X", "Y"]).is_some()
+        ["X", "Y", "Z"].contains(&&*self.letter) && self.all_beside(&["X", "Y"]).is_some()
     }
 
     /// Returns the channels G and B beside a channel R; empty unless both are there.
     fn colors_beside(&self) -> Vec<usize> {
-        if self.last == "R" { self.all_beside(&["G", "B"]).unwrap_or_default() } else { Vec::new() }
+        if self.letter == "R" { self.all_beside(&["G", "B"]).unwrap_or_default() } else { Vec::new() }
     }
 
     /// Returns the channels of these names in the same layer, if all are there.

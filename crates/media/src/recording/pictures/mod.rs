@@ -98,10 +98,9 @@ fn from_names(folder: &RecordingFolder, names: Vec<String>, options: &Options) -
         };
         let maps_root = maps_dir.canonicalize().map_err(RecordingError::io("open the depth maps", &maps_dir))?;
         let maps_dir = if maps_dir == *dir { dir } else { &maps_root };
-        return match {
-            let scale = Scale::of_folder(dir, pictures.folder);
-            rgbd::from_pairs(dir, (pictures, names.clone()), (maps_dir, maps, map_names), scale, options)
-        } {
+        let scale = Scale::of_folder(dir, pictures.folder);
+        let paired = rgbd::from_pairs(dir, (pictures, names.clone()), (maps_dir, maps, map_names), scale, options);
+        return match paired {
             Err(error @ RecordingError::NoNumberPairs { .. }) => {
                 tracing::warn!("{error}; the pictures are used without depth");
                 Ok(without_depth(dir, names, options))

@@ -129,8 +129,7 @@ pub fn exr_in_window(path: &Path, channels: &[(&str, &[f32])], at: (i32, i32), d
     use exr::prelude::*;
     let size = (SIZE.0 as usize, SIZE.1 as usize);
     let channel = |(name, values): &(&str, &[f32])| AnyChannel::new(*name, FlatSamples::F32(values.to_vec()));
-    let mut layer = LayerAttributes::default();
-    layer.layer_position = Vec2(at.0, at.1);
+    let layer = LayerAttributes { layer_position: Vec2(at.0, at.1), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(channels.iter().map(channel).collect());
     let layer = Layer::new(size, layer, Encoding::SMALL_FAST_LOSSLESS, channels);
     let window = IntegerBounds::from_dimensions((display.0 as usize, display.1 as usize));
