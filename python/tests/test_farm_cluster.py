@@ -157,7 +157,7 @@ def test_what_fails_for_good_is_listed_and_the_rest_is_made(cluster, sources, ex
     (broken / "rgb" / "000007.png").write_bytes(b"no picture")
     said = farm(broken, *sources[:2], "--out", tmp_path / "out", *FORMAT, "--address", cluster.address, "--", *FLAGS, expect=1)
     assert "2 of 3 recordings" in said and "1 failed for good" in said, said
-    assert f"  {broken}: {broken}/associations.txt:8: rgb/000007.png: not a PNG, JPEG, TIFF, WebP, BMP or GIF file" in said, said
+    assert f"  {broken}: {broken}/associations.txt:8: rgb/000007.png: not a PNG, JPEG, TIFF, WebP, BMP, PNM or GIF file" in said, said
     check(tmp_path / "out", {name: expected[name] for name in ("take0.y4m", "take1.y4m")})
 
 
