@@ -9,7 +9,7 @@ use moxcms::{
 };
 use png::chunk::ChunkType;
 
-use bokehcam::color::{ToneCurve, ToneCurves};
+use bokehcam::color::{ToneCurve, ToneCurves, linear_to_srgb};
 use bokehcam::compute::catch_panic;
 
 /// What a profile without usable tone curves means for the blur, for a message.
@@ -132,8 +132,16 @@ fn has_srgb_primaries(profile: &ColorProfile) -> bool {
     !is_stated || !pairs.into_iter().any(|(a, b)| far(a.x, b.x) || far(a.y, b.y) || far(a.z, b.z))
 }
 
+/// Returns whether the tone curves of a profile, if it has any, are sRGB's up to a tenth of an 8-bit code. Some codes tell
+/// that, as every frame of a folder of pictures may have a profile.
 fn has_srgb_curves(profile: &ColorProfile) -> bool {
-    curves_of(profile).is_none_or(|curves| curves.are_srgb())
+    const STEPS: u8 = 64;
+    let is_srgb = |curve: &ToneReprCurve| {
+        let Ok(evaluator) = curve.make_linear_evaluator() else { return false };
+        let mut codes = (0..=STEPS).map(|step| f32::from(step) / f32::from(STEPS));
+        codes.all(|code| (linear_to_srgb(evaluator.evaluate_value(code)) - code).abs() * 255.0 < 0.1)
+    };
+    [&profile.red_trc, &profile.green_trc, &profile.blue_trc].into_iter().flatten().all(is_srgb)
 }
 
 /// Returns the tone curves of an RGB profile; `None` if it has none.
