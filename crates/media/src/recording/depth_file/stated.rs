@@ -43,8 +43,9 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Va
         values.stated = Some(MapUnit::Disparity { rig: rig.map(|geometry| geometry.rig) });
     } else if values.role == Role::InverseDepth {
         values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
-    } else if let Some((per_m, invalid, note)) =
-        scale_beside(path).filter(|_| values.samples == Samples::Sixteen && options.scale.is_none())
+    } else if values.samples == Samples::Sixteen
+        && options.scale.is_none()
+        && let Some((per_m, invalid, note)) = scale_beside(path)
     {
         (values.stated, values.invalid) = (Some(MapUnit::Depth { per_m }), invalid);
         values.notes.push(note);

@@ -1,5 +1,6 @@
 //! Pictures that belong to others in their folder: depth maps, masks and confidence, by name and content.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::super::decode::{self, PictureKind};
@@ -18,7 +19,8 @@ pub(in crate::recording) fn is_map(stem: &str) -> bool {
 /// its name says that it holds depth or what is measured beside it, or is that of a picture in colours.
 pub fn is_companion(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    is_map(&stem) || is_grey(path) && (Role::of_name(&stem) != Role::Unstated || has_color_twin(path))
+    // Names first: a header is a file to open.
+    is_map(&stem) || (Role::of_name(&stem) != Role::Unstated || has_color_twin(path)) && is_grey(path)
 }
 
 /// Returns whether a file is the depth map of a picture beside it, by its name.
@@ -32,11 +34,18 @@ pub(in crate::recording) fn has_picture_of(map: &Path) -> bool {
 /// of 16 bits.
 pub(super) fn find_twin_maps(dir: &Path) -> Vec<String> {
     let mut names = find_pictures(dir, |stem| !is_map(stem)).unwrap_or_default();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    names.iter().for_each(|name| *counts.entry(stem_of(name)).or_default() += 1);
     names.retain(|name| {
         let path = dir.join(name);
-        has_color_twin(&path) && kind(&path) == Some(PictureKind::Depth)
+        counts[&stem_of(name)] > 1 && has_color_twin(&path) && kind(&path) == Some(PictureKind::Depth)
     });
     names
+}
+
+/// Returns the name of a file without its ending.
+pub(super) fn stem_of(name: &str) -> String {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned()
 }
 
 fn kind(path: &Path) -> Option<PictureKind> {

@@ -15,6 +15,7 @@ use super::fault::PictureFault;
 use super::folder::{Pictures, find_pictures, has_pictures};
 use super::rgbd::{self, Scale};
 use super::{Options, decode, mask_file, timeline};
+use companions::stem_of;
 pub use companions::{MAP_SUFFIXES, is_companion};
 pub(super) use companions::{has_picture_of, is_map};
 use pattern::Pattern;
@@ -30,9 +31,8 @@ pub(super) const LAYOUT: Layout = Layout {
 /// Returns the names of the pictures in `dir` without depth maps, and what else belongs to pictures that are there.
 fn find_photos(dir: &Path) -> Result<Vec<String>> {
     let names = find_pictures(dir, |stem| !is_map(stem))?;
-    let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
-    let stems: HashSet<String> = names.iter().map(|name| stem(name)).collect();
-    let is_mask = |name: &String| mask_file::picture_stem(&stem(name)).is_some_and(|photo| stems.contains(photo));
+    let stems: HashSet<String> = names.iter().map(|name| stem_of(name)).collect();
+    let is_mask = |name: &String| mask_file::picture_stem(&stem_of(name)).is_some_and(|photo| stems.contains(photo));
     let count = names.len();
     let (masks, mut photos): (Vec<String>, Vec<String>) = names.into_iter().partition(is_mask);
     let all = photos.clone();
