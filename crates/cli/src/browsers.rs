@@ -6,8 +6,8 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use bokehcam_media::files::data::{absolute_env_path, user_dir};
-use bokehcam_media::files::input;
+use bokehcam_files::data::{absolute_env_path, user_dir};
+use bokehcam_files::input;
 
 /// The feature to enable, and the flag that enables it alone.
 pub const FEATURE: &str = "WebRtcPipeWireCamera";

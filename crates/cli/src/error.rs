@@ -11,11 +11,11 @@ use bokehcam::calibration::CalibrationError;
 use bokehcam::compute::panic_message;
 use bokehcam::depth::DepthError;
 use bokehcam::look::LookError;
+use bokehcam_files::input;
 use bokehcam_live::capture::CaptureError;
 use bokehcam_live::pipeline::Fault;
 use bokehcam_live::sink::SinkError;
 use bokehcam_live::source::SourceError;
-use bokehcam_media::files::input;
 use bokehcam_media::recording::RecordingError;
 
 /// Error of a command.

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::log;
-use bokehcam_media::files::input::find_special_file_kind;
-use bokehcam_media::files::{atomic_file, place};
+use bokehcam_files::input::find_special_file_kind;
+use bokehcam_files::{atomic_file, place};
 use bokehcam_media::recording::still::{self, PhotoFormat};
 
 /// Returns the picture format for the name of a result, the value of the option `what`.

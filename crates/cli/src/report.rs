@@ -6,10 +6,10 @@ use std::path::Path;
 use super::error::CliError;
 use super::files::{create_parent_folder, refuse_overwrite};
 use super::terminal::{print_to_stderr, print_to_stdout};
+use bokehcam_files::atomic_file::PartFile;
+use bokehcam_files::place;
 use bokehcam_live::sink::Target;
 use bokehcam_live::stats::Report;
-use bokehcam_media::files::atomic_file::PartFile;
-use bokehcam_media::files::place;
 
 /// Path that stands for standard output.
 const STDOUT: &str = "-";

@@ -8,9 +8,9 @@ use super::error::CliError;
 use super::files::refuse_overwriting_source;
 use super::options::{Stream, Streaming};
 use bokehcam::look::BackgroundSetting;
+use bokehcam_files::place;
 use bokehcam_live::sink::{Backpressure, Options, Sink, Sound, Target, Tee};
 use bokehcam_live::source::{DepthChoice, Frames, SourceName, video};
-use bokehcam_media::files::place;
 
 /// Refuses sinks that collide with each other or with an input, and options that need other sinks.
 ///

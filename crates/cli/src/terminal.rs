@@ -48,7 +48,7 @@ pub fn stop_flag_between(items: &'static str) -> Result<Arc<AtomicBool>, CliErro
         is_stopping.store(true, Ordering::Relaxed);
         // A hanging network must not delay the end.
         #[cfg(feature = "networks")]
-        bokehcam_media::network::shorten_timeouts();
+        bokehcam_networks::network::shorten_timeouts();
         bokehcam::compute::device::begin_shutdown();
         print_to_stderr(&format!("stopping after the current {items}; press Ctrl-C again to abort"));
     };

@@ -15,9 +15,9 @@ use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam_live::source::installed::find_best_in;
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::Task;
 use bokehcam_media::recording::{self, Recording, Scratch};
+use bokehcam_networks::network::Task;
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 use clap::Parser;
 use image::imageops::{FilterType, resize};
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rfd::FileDialog;
 
 use super::services::PathKind;
-use bokehcam_media::files::data;
+use bokehcam_files::data;
 
 /// Errors shown if the desktop has no file chooser, for a source and for a background.
 const NO_DIALOG: &str = "This desktop has no file dialog (no portal, no zenity): drop a folder or a photo on the \

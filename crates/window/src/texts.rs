@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use bokehcam_media::files::{data, input};
+use bokehcam_files::{data, input};
 
 /// Translations by English text.
 pub type Table = HashMap<String, String>;

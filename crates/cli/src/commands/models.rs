@@ -9,9 +9,9 @@ use clap::{Args, Subcommand};
 use crate::error::CliError;
 use crate::log;
 use crate::terminal::{print_to_stderr, print_to_stdout};
+use bokehcam_files::{atomic_file, input};
 use bokehcam_live::source::installed::{installed_networks, model_folders};
-use bokehcam_media::files::{atomic_file, input};
-use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES};
+use bokehcam_networks::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES};
 
 /// List the networks that find depth in pictures of a single camera, and install them
 #[derive(Args, Debug)]

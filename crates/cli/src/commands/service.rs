@@ -16,8 +16,8 @@ use crate::files::{create_parent_folder, write_atomically};
 use crate::log;
 use crate::settings::file;
 use crate::terminal::{print_to_stderr, print_to_stdout};
-use bokehcam_media::files::data::user_dir;
-use bokehcam_media::files::input;
+use bokehcam_files::data::user_dir;
+use bokehcam_files::input;
 
 /// Start the camera for calls with your session, or stop doing so
 #[derive(Args, Debug)]

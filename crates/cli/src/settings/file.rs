@@ -11,8 +11,8 @@ use crate::error::CliError;
 use crate::log::{escape_controls, one_line};
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{self, Patch, SETTINGS, presets};
-use bokehcam_media::files::data::user_dir;
-use bokehcam_media::files::input;
+use bokehcam_files::data::user_dir;
+use bokehcam_files::input;
 
 /// A settings file with validated values.
 #[derive(Debug, Default)]

@@ -19,8 +19,8 @@ use crate::files::{create_parent_folder, write_atomically};
 use crate::log;
 use crate::terminal;
 use bokehcam::look::settings;
-use bokehcam_media::files::lock::lock_folder;
-use bokehcam_media::files::{atomic_file, input};
+use bokehcam_files::lock::lock_folder;
+use bokehcam_files::{atomic_file, input};
 
 /// Time limit for the lock of the file's folder, which programs hold while they save.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(10);

@@ -15,8 +15,8 @@ use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
 use bokehcam_lab::scene::{Scene, Situation, ThinLens, View};
 use bokehcam_live::source::installed::{find_best, find_best_in};
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::Task;
+use bokehcam_networks::network::Task;
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 use serde::Serialize;
 
 use super::masks::add_camera_noise;

@@ -10,8 +10,8 @@ use std::time::Duration;
 use rustix::process::geteuid;
 
 use super::{ControlError, Name, socket};
-use bokehcam_media::files::data::absolute_env_path;
-use bokehcam_media::files::lock::lock_folder;
+use bokehcam_files::data::absolute_env_path;
+use bokehcam_files::lock::lock_folder;
 
 /// Time limit for the folder's lock, which runs hold briefly while they start.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(1);

@@ -2,7 +2,7 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use bokehcam_media::files::folder::FolderError;
+use bokehcam_files::folder::FolderError;
 
 /// Why a frame could not be written.
 #[allow(missing_docs)] // The messages say what the fields are.

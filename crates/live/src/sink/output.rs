@@ -5,8 +5,8 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{Ending, SinkError};
-use bokehcam_media::files::atomic_file::{self, PartFile};
-use bokehcam_media::files::input::find_special_file_kind;
+use bokehcam_files::atomic_file::{self, PartFile};
+use bokehcam_files::input::find_special_file_kind;
 
 /// A file under construction that holds frames. A file with frames is never removed: if it cannot get its name, it is
 /// kept as `NAME.incomplete`.

@@ -12,7 +12,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, ioctl_fionread};
 
-use bokehcam_media::video::process::STOP_TIMEOUT;
+use bokehcam_files::process::STOP_TIMEOUT;
 
 /// How often a blocked writer checks whether to continue waiting.
 const TICK: Duration = Duration::from_millis(50);

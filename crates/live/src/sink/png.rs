@@ -10,8 +10,8 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::{Ending, Options, Sink, SinkError, interleave_alpha};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::files::atomic_file::PartFile;
-use bokehcam_media::files::folder::Folder;
+use bokehcam_files::atomic_file::PartFile;
+use bokehcam_files::folder::Folder;
 
 /// Writes `DIR/000000.png` and on, numbered in output order. Each file appears complete; files of an earlier run stay
 /// until all new ones exist.

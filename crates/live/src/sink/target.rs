@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use bokehcam::names::find_similar;
-use bokehcam_media::files::{folder, place};
+use bokehcam_files::{folder, place};
 
 /// Prefix of the name of a PipeWire camera.
 const PIPEWIRE: &str = "pipewire";

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::capture::CaptureError;
 use bokehcam::calibration::CalibrationError;
 use bokehcam::depth::DepthError;
-use bokehcam_media::files::input;
+use bokehcam_files::input;
 use bokehcam_media::recording::RecordingError;
 
 /// An error in opening a source.

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use super::networks::Opened;
 use super::options::{Order, Range};
 use super::{NetworkFile, OpenRequest, SingleCameraDepth, SourceError};
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::files::{data, input};
-use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES, Scaling, Task};
+use bokehcam_files::{data, input};
+use bokehcam_networks::network::{KNOWN_NETWORKS, KnownNetwork, MAX_BYTES, Scaling, Task};
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 
 /// Names the folder of networks that takes the place of those beside the program.
 const VARIABLE: &str = "BOKEHCAM_MODELS";

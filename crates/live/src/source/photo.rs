@@ -10,7 +10,7 @@ use bokehcam::depth::FrameInput;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::look::Look;
-use bokehcam_media::files::place;
+use bokehcam_files::place;
 use bokehcam_media::recording::depth_file::{self, DepthFile, DepthInside, Distances, EXTENSIONS};
 use bokehcam_media::recording::embedded::Focus;
 use bokehcam_media::recording::pictures::{self, MAP_SUFFIXES};

@@ -10,7 +10,7 @@ use super::options::Depth;
 use super::{Options, SourceError};
 use bokehcam::calibration::registration::{AnySizeRegistration, RgbdCalibration, RgbdCalibrationError};
 use bokehcam::calibration::{CameraIntrinsics, Distortion};
-use bokehcam_media::files::input;
+use bokehcam_files::input;
 use bokehcam_media::recording::{Options as Reading, Recording};
 
 #[derive(Deserialize)]

@@ -23,7 +23,7 @@ use bokehcam_live::capture::{Camera, Captured, FrameBuffers, FrameData, SourceIn
 use bokehcam_live::pipeline::{BlurSetup, ChangeSender, Destination, Pace, PipelineError, Run, run};
 use bokehcam_live::sink::{Ending, Sink, SinkError};
 use bokehcam_live::stats::Report;
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 
 use crate::fakes::{FakeBokeh, Trouble, camera_by, changed, depth_by, fake_bokeh};
 use crate::onnx;

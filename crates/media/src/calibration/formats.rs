@@ -4,8 +4,8 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use crate::files::input;
 use bokehcam::calibration::CalibrationError;
+use bokehcam_files::input;
 
 /// A format of stereo calibrations.
 pub struct Format {

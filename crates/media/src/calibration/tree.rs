@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::yaml::{Kind, Node};
 use super::{ini, yaml};
-use crate::files::input;
 use bokehcam::calibration::{CalibrationError, Fault};
+use bokehcam_files::input;
 
 /// A parsed file.
 pub(super) struct File {

@@ -24,7 +24,7 @@ use super::jpeg;
 use super::photo_metadata::PhotoMetadata;
 use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
-use crate::files::input;
+use bokehcam_files::input;
 
 /// Far more than a photograph of [`MAX_PIXELS`] needs.
 const MAX_JPEG_BYTES: u64 = 192 << 20;

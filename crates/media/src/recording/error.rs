@@ -4,8 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::fault::{GeometryFault, LineFault, PictureFault};
-use crate::files::folder::FolderError;
 use bokehcam::calibration::CalibrationError;
+use bokehcam_files::folder::FolderError;
 
 /// Result of reading or writing a recording or a picture.
 pub type Result<T, E = RecordingError> = std::result::Result<T, E>;

@@ -78,7 +78,7 @@ pub(super) type ReadResult<T = ()> = Result<T, PictureFault>;
 #[derive(Debug, thiserror::Error)]
 pub enum PictureFault {
     /// The file does not exist.
-    #[error("{}", crate::files::input::NO_FILE)]
+    #[error("{}", bokehcam_files::input::NO_FILE)]
     Missing,
     /// An aperture's picture is black, so no light would pass.
     #[error(

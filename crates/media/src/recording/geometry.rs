@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::error::{RecordingError, Result};
 use super::fault::GeometryFault;
-use crate::files::input;
 use bokehcam::optics::StereoRig;
+use bokehcam_files::input;
 
 /// Relative difference of the focal lengths that counts as rounding.
 const FOCAL_TOLERANCE: f64 = 1e-3;

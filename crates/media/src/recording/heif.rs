@@ -12,8 +12,8 @@ use tempfile::TempDir;
 
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
-use crate::files::guardian::Guardian;
-use crate::files::process::Process;
+use bokehcam_files::guardian::Guardian;
+use bokehcam_files::process::Process;
 
 const PROGRAM: &str = "heif-convert";
 /// Time after which the program counts as hung; the largest pictures take some seconds.

@@ -9,7 +9,7 @@ use super::contents::{ListPosition, PictureSource};
 use super::error::{RecordingError, Result};
 use super::fault::LineFault;
 use super::timeline::MAX_LENGTH_NS;
-use crate::files::{atomic_file, input};
+use bokehcam_files::{atomic_file, input};
 
 /// Maximum number of characters that messages quote of faulty text.
 const QUOTED_CHARS: usize = 40;

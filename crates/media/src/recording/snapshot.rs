@@ -15,9 +15,9 @@ use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::fault::png_fault;
 use super::still::{PhotoFormat, photo_format, write_color, write_depth};
-use crate::files::data::absolute_env_path;
-use crate::files::{atomic_file, user_folders};
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam_files::data::absolute_env_path;
+use bokehcam_files::{atomic_file, user_folders};
 
 /// The keyword of the PNG text with the settings.
 pub const KEYWORD: &str = "bokehcam";

@@ -17,9 +17,9 @@ pub use super::photo_metadata::PhotoFormat;
 use super::photo_metadata::PhotoMetadata;
 use super::unit::MapUnit;
 use super::{check_depth_scale, coded, decode, depth_covers, encode, luma, pfm, tiff_file};
-use crate::files::atomic_file;
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
+use bokehcam_files::atomic_file;
 
 /// Reads a PNG or JPEG (detected by content) as it is shown, in 8-bit sRGB, rotated upright by its orientation tag.
 /// Grey is repeated, what is transparent is in front of white, 16 bits are rounded to 8. At most 16384 pixels a side, and 120 megapixels.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::files::process::read_output_within;
+use bokehcam_files::process::read_output_within;
 
 /// The program that decodes and encodes.
 pub const FFMPEG: &str = "ffmpeg";

@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::VideoFile;
-use crate::files::input;
+use bokehcam_files::input;
 
 /// What ffmpeg says when pictures or parts of them are lost. Its other errors may be harmless: `mmco: unref short failure`
 /// begins every recording that was cut at an open group of pictures.

@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 use super::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 use super::completeness::{Expected, is_cut_gif, is_loss};
 use super::{VideoError, VideoFile};
-use crate::files::pipe_reader::{Filled, PipeReader};
-use crate::files::process::{Process, Watchdog};
 use crate::layout::MAX_SIDE_PX;
 use bokehcam::color::YcbcrMatrix;
+use bokehcam_files::pipe_reader::{Filled, PipeReader};
+use bokehcam_files::process::{Process, Watchdog};
 
 /// Number of error messages that are kept: the first ones name the cause.
 const MAX_MESSAGES: usize = 2;

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::files::input;
 use crate::layout::MAX_SIDE_PX;
+use bokehcam_files::input;
 
 /// Why a video file delivers no picture.
 #[allow(missing_docs)] // The messages say what the fields are.

@@ -11,8 +11,6 @@ mod encryption;
 mod error;
 mod probe;
 
-#[doc(hidden)]
-pub use crate::files::process;
 pub use decoder::{Conversion, Decoded, Decoder, Pixels};
 pub use error::VideoError;
 pub use probe::VideoFile;

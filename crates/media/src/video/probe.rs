@@ -11,9 +11,9 @@ use serde::Deserialize;
 use super::VideoError;
 use super::command::{FFPROBE, INPUT_OPTIONS, base_command, file_url, find_unlisted_format};
 use super::encryption::is_encrypted;
-use crate::files::input;
-use crate::files::process::Process;
 use bokehcam::color::YcbcrMatrix;
+use bokehcam_files::input;
+use bokehcam_files::process::Process;
 
 /// Maximum size of ffprobe's answer, which has a few hundred bytes.
 const MAX_ANSWER_BYTES: u64 = 1 << 16;

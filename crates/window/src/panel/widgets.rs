@@ -314,7 +314,7 @@ pub fn add_remark(ui: &mut Ui, text: &str) {
 
 /// Adds a path, shortened at its beginning because the end identifies the file.
 pub fn add_path(ui: &mut Ui, path: &str) {
-    let shown = bokehcam_media::files::user_folders::format_output(path);
+    let shown = bokehcam_files::user_folders::format_output(path);
     ui.scope(|ui| add_remark(ui, &truncate_start(&shown, 38))).response.on_hover_text(path);
 }
 

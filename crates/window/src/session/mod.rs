@@ -23,13 +23,13 @@ use bokehcam::depth::plate::Guide;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::Look;
+use bokehcam_files::user_folders::{self as folders, Folders};
 use bokehcam_live::capture::Seeker;
 use bokehcam_live::control::Answer;
 use bokehcam_live::pipeline::{OutputRequest, PipelineError, View};
 use bokehcam_live::sink::ShutterControl;
 use bokehcam_live::sink::tee_control::MemberEvent;
 use bokehcam_live::stats::Report;
-use bokehcam_media::files::user_folders::{self as folders, Folders};
 
 /// A slower close is logged.
 const SLOW_CLOSE: Duration = Duration::from_secs(3);

@@ -14,10 +14,10 @@ use super::{EventSender, SessionConfig};
 use bokehcam::clock::Clock;
 use bokehcam::frame::ColorImage;
 use bokehcam::link::demand::{Demand, Watch};
+use bokehcam_files::user_folders as folders;
 use bokehcam_live::sink::card::draw_card;
 use bokehcam_live::sink::tee_control::{MemberEvent, MemberState};
 use bokehcam_live::sink::{self, Ending, Shutter, ShutterControl, Sink, SinkError, Target, Tee, TeeControl};
-use bokehcam_media::files::user_folders as folders;
 
 /// Size and period of the pictures before the first source is open; nothing shows them.
 const FIRST_SIZE: (u32, u32) = (16, 16);

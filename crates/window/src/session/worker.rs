@@ -13,11 +13,11 @@ use super::{Command, EventSender, SessionConfig, SessionEvent, SessionOutcome, h
 use crate::services::CliOption;
 use crate::state::{DepthMethod, Output, Request, Source, Update};
 use bokehcam::look::Look;
+use bokehcam_files::user_folders as folders;
 use bokehcam_live::pipeline::PipelineError;
 use bokehcam_live::sink;
 use bokehcam_live::sink::tee_control::MemberEvent;
 use bokehcam_live::stats::Report;
-use bokehcam_media::files::user_folders as folders;
 
 /// Shown when the virtual camera is switched off while a program reads it.
 const STILL_READ: &str = "Calls see a still card now. The camera goes from their lists once they have let go of it.";

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::state::Preferences;
 use bokehcam::look::{Look, LookError, Patch};
+use bokehcam_files::{atomic_file, input};
 use bokehcam_live::source::{Kind, SourceName, devices};
-use bokehcam_media::files::{atomic_file, input};
 
 /// State saved at the end of a preview.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

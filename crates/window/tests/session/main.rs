@@ -25,7 +25,7 @@ use bokehcam::frame::DepthMap;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
-use bokehcam_media::files::user_folders::is_recording_name;
+use bokehcam_files::user_folders::is_recording_name;
 use bokehcam_window::state::{Output, Request, Source, Update};
 
 use heard::{PATIENCE, look};

@@ -23,7 +23,7 @@ pub fn check_computing() -> Vec<Finding> {
 /// Checks whether a single camera can give a portrait.
 #[cfg(feature = "networks")]
 fn check_networks() -> Finding {
-    use bokehcam_media::network::Task;
+    use bokehcam_networks::network::Task;
     let installed = bokehcam_live::source::installed::installed_networks();
     let names: Vec<&str> = installed.iter().map(|(known, _)| known.file).collect();
     let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);

@@ -22,8 +22,8 @@ use bokehcam::compute::{Backend, memory};
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
+use bokehcam_files::place;
 use bokehcam_live::source::DepthChoice;
-use bokehcam_media::files::place;
 use bokehcam_media::recording::still::PhotoFormat;
 
 /// Peak memory per pixel of reading, blurring and encoding a picture.

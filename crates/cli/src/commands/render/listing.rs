@@ -9,8 +9,8 @@ use glob::MatchOptions;
 
 use crate::error::CliError;
 use crate::log;
+use bokehcam_files::place;
 use bokehcam_live::source::photo;
-use bokehcam_media::files::place;
 use bokehcam_media::recording::still::{self, PhotoFormat};
 
 /// As in a shell: `*` neither matches a separator nor hidden files.

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::CliError;
-use bokehcam_media::files::place;
+use bokehcam_files::place;
 
 /// Maps or masks of many pictures: a folder, by the names of the pictures.
 pub(super) struct MapFolder<'a> {

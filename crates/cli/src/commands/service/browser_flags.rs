@@ -15,7 +15,7 @@ use crate::error::CliError;
 use crate::files::{create_parent_folder, write_atomically};
 use crate::settings::file::state_folder;
 use crate::terminal::print_to_stderr;
-use bokehcam_media::files::place::resolve_links;
+use bokehcam_files::place::resolve_links;
 
 /// A file to which the flag was added.
 #[derive(Debug, Deserialize, Serialize)]

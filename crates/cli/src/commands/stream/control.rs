@@ -15,13 +15,13 @@ use bokehcam::clock::Clock;
 use bokehcam::computing::ExecutorFactory;
 use bokehcam::link::demand::Demand;
 use bokehcam::look::{Change, Look, LookFacts, Patch};
+use bokehcam_files::user_folders::{Folders, timestamped_stem};
 use bokehcam_live::control::{Answer, Claim, Server, Status, bus};
 use bokehcam_live::controller::{Changed, CommandLine, ControllableRun, Controller, refuse_look};
 use bokehcam_live::pipeline::{ChangeSender, Progress};
 use bokehcam_live::sink::ShutterControl;
 use bokehcam_live::source::{DepthOrigin, Kind};
 use bokehcam_live::stats::FrameRateMeter;
-use bokehcam_media::files::user_folders::{Folders, timestamped_stem};
 use bokehcam_media::recording::snapshot::{self, Snapshot};
 
 /// Maximum wait for a picture to save.

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::DepthMap;
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::{KNOWN_NETWORKS, KnownNetwork, Task};
+use bokehcam_networks::network::{KNOWN_NETWORKS, KnownNetwork, Task};
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 
 use super::onnx::matte;
 use super::{WEIGHTS, disc, read, real, written};

@@ -14,8 +14,8 @@ use std::time::Duration;
 
 use bokehcam::depth::{DepthSource, FrameInput};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::{self, Tensor};
+use bokehcam_networks::network::{self, Tensor};
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 use onnx::{Side, constant, conv, matte, model, node, port};
 use tempfile::TempDir;
 

@@ -2,8 +2,8 @@
 
 use bokehcam::depth::plate::{PlateDepth, Step};
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::Task;
+use bokehcam_networks::network::Task;
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 
 use tempfile::TempDir;
 

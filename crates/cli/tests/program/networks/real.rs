@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam_live::source::installed::find_best_in;
-use bokehcam_media::depth::single_camera::{Hints, SingleCamera};
-use bokehcam_media::network::{KNOWN_NETWORKS, Task, Tensor};
 use bokehcam_media::recording::{Options, Recording, Scratch};
+use bokehcam_networks::network::{KNOWN_NETWORKS, Task, Tensor};
+use bokehcam_networks::single_camera::{Hints, SingleCamera};
 
 use super::read;
 use crate::program::Home;
@@ -144,8 +144,8 @@ fn shipped() -> PathBuf {
     PathBuf::from(folder).join(KNOWN_NETWORKS[0].file)
 }
 
-fn load(file: &Path) -> bokehcam_media::network::Network {
-    bokehcam_media::network::load(file).unwrap().network
+fn load(file: &Path) -> bokehcam_networks::network::Network {
+    bokehcam_networks::network::load(file).unwrap().network
 }
 
 #[test]

@@ -10,7 +10,7 @@ use self::convert::Converter;
 use self::header::Header;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
 use bokehcam::frame::Stamp;
-use bokehcam_media::files::pipe_reader::{Filled, PipeReader};
+use bokehcam_files::pipe_reader::{Filled, PipeReader};
 
 /// The name of standard input as a source.
 pub const NAME: &str = "-";

@@ -18,8 +18,8 @@ use super::output::OutputFile;
 use super::pipe::Pipe;
 use super::{Ending, Options, Sink, SinkError, Sound, Written, check_size};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::files::atomic_file::PartFile;
-use bokehcam_media::video::process::{Process, ProcessEnd};
+use bokehcam_files::atomic_file::PartFile;
+use bokehcam_files::process::{Process, ProcessEnd};
 
 /// Longest wait for an encoder to start reading; frames are sent to it in any case.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(2);

@@ -3,8 +3,8 @@
 use std::fs;
 
 use bokehcam::frame::ColorImage;
+use bokehcam_files::folder::FolderError;
 use bokehcam_live::sink::{Ending, SinkError};
-use bokehcam_media::files::folder::FolderError;
 
 use super::{PERIOD_NS, forced, listing, open, options, picture, put_all};
 

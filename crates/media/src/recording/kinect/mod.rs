@@ -15,8 +15,8 @@ use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource,
 use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::{Options, Unpaired, depth_covers, pair, timeline};
-use crate::files::input;
 use bokehcam::calibration::registration::RgbdCalibration;
+use bokehcam_files::input;
 use file::KinectFile;
 use track::{Block, ColorFormat, Track};
 

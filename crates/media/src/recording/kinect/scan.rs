@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 
 use super::ebml::{self, Head};
 use super::track::{Block, Track};
-use crate::files::input::MAX_CALIBRATION_BYTES;
 use crate::recording::MAX_ENTRIES;
+use bokehcam_files::input::MAX_CALIBRATION_BYTES;
 
 /// The first bytes of a file: the ID of its first element.
 pub(super) const MAGIC: [u8; 4] = [0x1A, 0x45, 0xDF, 0xA3];

@@ -22,8 +22,8 @@ use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource,
 use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::{Options, Unpaired, pair, timeline};
-use crate::files::input;
 use bokehcam::calibration::registration::RgbdCalibration;
+use bokehcam_files::input;
 use chunk::ChunkCache;
 use file::McapFile;
 use topic::{Message, Topic};

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use super::definitions::{CAMERA_INFO, COMPRESSED_IMAGE, MessageWriter};
 use super::file_writer::FileWriter;
-use crate::files::atomic_file::{self, PartFile};
 use crate::recording::encode;
 use crate::recording::error::RecordingError;
 use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam_files::atomic_file::{self, PartFile};
 
 /// The namespaces of colour and depth, as RealSense names them: depth has the view of the colour camera.
 const COLOR: &str = "/camera/color";

@@ -5,9 +5,9 @@ use std::io::{Read, Seek};
 use serde::Deserialize;
 use zip::ZipArchive;
 
-use crate::files::input::MAX_TEXT_BYTES;
 use crate::recording::MAX_SIDE_PX;
 use crate::recording::timeline::MAX_LENGTH_NS;
+use bokehcam_files::input::MAX_TEXT_BYTES;
 
 const NAME: &str = "metadata";
 

@@ -20,8 +20,8 @@ use super::decoders::{guard, guard_as};
 use super::error::RecordingError;
 use super::fault::{PictureFault, ReadResult, damaged_fault};
 use super::{MAX_ENTRIES, MAX_SIDE_PX, Options, Unpaired};
-use crate::files::input;
 use bokehcam::frame::DepthMap;
+use bokehcam_files::input;
 use metadata::Metadata;
 
 pub(super) const LAYOUT: Layout =

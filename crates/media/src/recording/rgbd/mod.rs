@@ -13,7 +13,7 @@ use super::decode::DepthUnits;
 use super::error::RecordingError;
 use super::folder::{Pictures, pair_by_name};
 use super::{DepthUnit, Options, Unpaired, timeline};
-use crate::files::folder::has_file_list;
+use bokehcam_files::folder::has_file_list;
 pub(super) use scale::Scale;
 
 pub(super) const LAYOUT: Layout = Layout {

@@ -7,9 +7,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::{LAYOUT, find_pair};
-use crate::files::input;
 use crate::recording::error::RecordingError;
 use crate::recording::{LAYOUTS, pictures};
+use bokehcam_files::input;
 
 /// Units per metre of Replica, as NICE-SLAM and iMAP render it: 65535 is 10 m.
 const REPLICA_SCALE: f32 = 6553.5;

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, is_picture, list::split_pair};
-use crate::files::input;
 use crate::recording::list::split_lines;
+use bokehcam_files::input;
 
 /// Usual names, in order of preference.
 const NAMES: [&str; 6] =

@@ -4,11 +4,11 @@ use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use crate::files::atomic_file::{self, PartFile};
-use crate::files::folder::{Folder, list_file};
-use crate::files::input;
 use crate::recording::error::RecordingError;
 use crate::recording::list::{split_lines, whole_lines};
+use bokehcam_files::atomic_file::{self, PartFile};
+use bokehcam_files::folder::{Folder, list_file};
+use bokehcam_files::input;
 
 /// A list under construction. Each line is written at once, so that it survives if the process is killed.
 pub(super) struct GrowingList {

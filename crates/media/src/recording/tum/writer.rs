@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::growing::GrowingList;
 use super::{COLOR_LIST, DEPTH_LIST};
-use crate::files::folder::{Folder, FolderError};
 use crate::recording::error::RecordingError;
 use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
 use crate::recording::time::Seconds;
 use crate::recording::{check_depth_scale, encode};
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam_files::folder::{Folder, FolderError};
 
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";

@@ -7,9 +7,9 @@ use super::super::{SaveOptions, SessionEvent, Still, held};
 use super::SessionWorker;
 use bokehcam::engine::Images;
 use bokehcam::look::{Look, Patch};
+use bokehcam_files::user_folders as folders;
 use bokehcam_live::control::Answer;
 use bokehcam_live::source::{Kind, SourceName};
-use bokehcam_media::files::user_folders as folders;
 use bokehcam_media::recording::snapshot::{self, Snapshot};
 
 /// Number of recent looks kept for snapshots: a frame in flight has one of the last few.

@@ -8,8 +8,8 @@ use crate::services::PathKind;
 use crate::session::{Command, EventSender};
 use crate::state::{Request, Update};
 use bokehcam::look::BackgroundSetting;
+use bokehcam_files::atomic_file;
 use bokehcam_live::source::video::is_video;
-use bokehcam_media::files::atomic_file;
 
 /// Interval of checks for new devices, for readers of virtual cameras, and of the recording's size.
 const CHECK_PERIOD: Duration = Duration::from_secs(1);

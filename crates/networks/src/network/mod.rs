@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 pub use bounded::shorten_timeouts;
 pub use known::{KNOWN_NETWORKS, KnownNetwork, Scaling, Task};
 
-use crate::files::input;
 use bokehcam::compute::catch_panic;
+use bokehcam_files::input;
 
 /// Maximum size of a file: networks that a CPU can run live have less than 100 MB.
 pub const MAX_BYTES: u64 = 200 << 20;

@@ -1,4 +1,5 @@
-//! User files: written atomically (whole or not at all), and read within limits; programs that convert others.
+//! Files of users: written atomically (whole or not at all), and read within limits; programs that convert others, and
+//! where a desktop keeps what.
 
 pub mod atomic_file;
 pub mod data;
