@@ -12,10 +12,8 @@ use super::input::{assert_one_line, file_path, split_files, write_file};
 pub fn calibration(data: &[u8]) {
     let (one, two) = ("intrinsics.yml", "other.yml");
     let read = match split_files(data).as_slice() {
-        [only] => bokehcam_media::calibration::load_calibration(&[&write_file(one, only)]),
-        [left, right, ..] => {
-            bokehcam_media::calibration::load_calibration(&[&write_file(one, left), &write_file(two, right)])
-        }
+        [only] => bokehcam_calibration::load_calibration(&[&write_file(one, only)]),
+        [left, right, ..] => bokehcam_calibration::load_calibration(&[&write_file(one, left), &write_file(two, right)]),
         [] => return,
     };
     let rig = match read {

@@ -1,7 +1,7 @@
 //! Depth maps in GStreamer's memory, and their assignment to pictures.
 
 use bokehcam::frame::DepthMap;
-use bokehcam_media::layout::MAX_SIDE_PX;
+use bokehcam_live::layout::MAX_SIDE_PX;
 use gst::prelude::*;
 use gst_base::prelude::*;
 

@@ -3,8 +3,8 @@
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
 use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::layout::{ColorEncoding, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
 use bokehcam_live::sink::raw::Encoder;
-use bokehcam_media::layout::{ColorEncoding, FourCc, Layout, MAX_SIDE_PX, Plane, Range, Transfer};
 use gst_video::prelude::*;
 use gst_video::{VideoColorMatrix, VideoColorRange, VideoFormat, VideoFrameRef, VideoInfo};
 

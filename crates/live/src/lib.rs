@@ -14,8 +14,8 @@
 //! | 4 | `controller`: answers requests to a run, by the same code for a stream and a preview |
 //! | 3 | [`source`]: cameras, recordings and their depth, by name |
 //! | 2 | [`pipeline`]: the threads of a run |
-//! | 1 | [`capture`], [`depth`] (of depth cameras), [`sink`]: what a run begins and ends with |
-//! | 0 | [`stats`] (the report), `v4l2`, `pipewire`, `control` (the socket of `ctl`), [`camera_control`] |
+//! | 1 | [`capture`], [`depth`] (of cameras and files), [`sink`]: what a run begins and ends with |
+//! | 0 | [`stats`] (the report), `v4l2`, `pipewire`, `control` (the socket of `ctl`), [`camera_control`], [`layout`] of raw pictures |
 //!
 //! `unsafe` is allowed in `buffer.rs`, `log.rs`, `memory.rs` and `session.rs` of `pipewire`, and under `v4l2`, where each
 //! block has its safety argument.
@@ -29,8 +29,8 @@ pub mod capture;
 pub mod control;
 #[doc(hidden)]
 pub mod controller;
-#[cfg(feature = "camera")]
 pub mod depth;
+pub mod layout;
 pub mod pipeline;
 #[cfg(feature = "pipewire")]
 #[doc(hidden)]

@@ -5,8 +5,8 @@ use bokehcam::engine::FrameProcessor;
 use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look};
 use bokehcam_live::capture::pixels::Decoder;
+use bokehcam_live::layout::{FourCc, Layout, Plane, Range, Transfer};
 use bokehcam_live::sink::raw::Encoder;
-use bokehcam_media::layout::{FourCc, Layout, Plane, Range, Transfer};
 use gst::prelude::*;
 use gst_video::VideoInfo;
 

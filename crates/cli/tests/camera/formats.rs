@@ -1,8 +1,8 @@
 //! Decoding of each format of the camera.
 
+use bokehcam_live::layout::Content;
 use bokehcam_live::v4l2::modes::{QueueKind, list_modes};
 use bokehcam_live::v4l2::{Device, FourCc};
-use bokehcam_media::layout::Content;
 
 use super::machine::{BARS, CAMERA, Machine, distance_from, frame, open, run, wish};
 

@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 use bokehcam::frame::ColorImage;
 use bokehcam_live::capture::v4l2::V4l2Camera;
 use bokehcam_live::capture::{Captured, MAX_WAIT};
+use bokehcam_live::layout::Content;
 use bokehcam_live::v4l2::live::ModeRequest;
 use bokehcam_live::v4l2::node::list_nodes;
 use bokehcam_live::v4l2::{Device, FourCc, controls};
-use bokehcam_media::layout::Content;
 use rustix::process::Signal;
 
 use super::program::{self, Beside, Ran, assert_accounted, json};

@@ -240,7 +240,7 @@ fn only_files_are_read() {
             symlink(target, at(name)).unwrap();
         }
         assert_says(open(&folder), what);
-        assert_says(bokehcam_media::calibration::load_calibration(&[&at("left.yaml")]), what);
+        assert_says(bokehcam_calibration::load_calibration(&[&at("left.yaml")]), what);
         assert_says(Geometry::read(&at("calib.txt"), &at("photo.png")), what);
         assert_says(read_color(&at("photo.png")), "not a regular file");
         assert_says(read_depth(&at("map.pfm"), 1.0, None), "not a regular file");

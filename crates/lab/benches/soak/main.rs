@@ -27,9 +27,9 @@ use bokehcam::clock::Clock;
 use bokehcam::computing::ComputeOptions;
 use bokehcam::look::number::OrAuto;
 use bokehcam::look::{Effect, Look, Refine, Strength};
+use bokehcam_live::depth::recorded::RecordedDepth;
 use bokehcam_live::pipeline::{self, BlurSetup, Destination, Pace, Run};
 use bokehcam_live::stats::Report;
-use bokehcam_media::depth::recorded::RecordedDepth;
 use bokehcam_media::recording::{Options as Reading, Recording};
 use clap::Parser;
 

@@ -116,7 +116,7 @@ pub fn load_euroc(data: &Path) -> Outcome<Option<Sequence>> {
         return Ok(None);
     }
     let sensors = ["cam0", "cam1"].map(|camera| folder.join(camera).join("sensor.yaml"));
-    let calibration = bokehcam_media::calibration::load_calibration(&[&sensors[0], &sensors[1]])?;
+    let calibration = bokehcam_calibration::load_calibration(&[&sensors[0], &sensors[1]])?;
     let names = list_files(&folder.join("cam0/data"))?;
     let first = names.first().ok_or_else(|| format!("{}: no pictures", folder.display()))?;
     let rectifier = Rectifier::new(&calibration, read_color(&folder.join("cam0/data").join(first))?.size())?;

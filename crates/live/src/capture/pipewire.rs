@@ -5,6 +5,7 @@ use std::mem;
 use super::pixels::Decoder;
 use super::v4l2::MediaTime;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, SourceInfo};
+use crate::layout::{Family, LayoutError, MAX_PLANES, Plane};
 use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
 use crate::pipewire::reader::{Frame, PictureHandler, Reader};
 use crate::stats::DropCause;
@@ -18,7 +19,6 @@ use bokehcam::frame::fit::Letterbox;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::pool::{Pool, Pooled};
 use bokehcam::link::{self, Received, Receiver, Sender};
-use bokehcam_media::layout::{Family, LayoutError, MAX_PLANES, Plane};
 
 /// Maximum number of pictures in flight: one being decoded, one waiting, and one being received.
 const PICTURES: usize = 3;

@@ -15,7 +15,7 @@ use rustix::io::Errno;
 use rustix::ioctl::{Opcode, Setter, ioctl, opcode};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
-use bokehcam_media::layout::MAX_PLANES;
+use crate::layout::MAX_PLANES;
 
 /// DMA_BUF_IOCTL_SYNC and its flags (linux/dma-buf.h).
 const SYNC: Opcode = opcode::write::<u64>(b'b', 0);

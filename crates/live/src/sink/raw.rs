@@ -7,8 +7,8 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::yuv::Converter;
+use crate::layout::{Component, Family, Layout, Range};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::{Component, Family, Layout, Range};
 
 /// Encodes pictures of one layout, with its own buffers.
 #[derive(Debug)]

@@ -12,9 +12,9 @@ use super::rate::frame_rate;
 use super::rate_converter::{Action, RateConverter};
 use super::yuv::Converter;
 use super::{Ending, Options, Sink, SinkError, check_size};
+use crate::layout::Range;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::Range;
 
 /// Longest gap between frames that a file fills by repeating the last picture; longer ones are cut to this.
 const MAX_GAP: Duration = Duration::from_secs(10);

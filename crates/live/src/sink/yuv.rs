@@ -1,9 +1,9 @@
 //! R'G'B' to Y'CbCr conversion (ITU-R BT.601, BT.709, BT.2020) in 8 bits: planar 4:2:0 here, and the raw formats of
 //! cameras in [`raw`](super::raw).
 
+use crate::layout::Range;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::Range;
 
 /// Fractional bits of the fixed-point coefficients; luma fits into 32 bits, and so does chroma, which sums up to eight
 /// pixels and has three more bits.

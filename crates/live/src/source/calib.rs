@@ -50,13 +50,13 @@ pub fn read_pair_calibration(
     baseline_m: Option<f32>,
 ) -> Result<PairCalibration, SourceError> {
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    let mut read = match (bokehcam_media::calibration::load_calibration_for(&paths, Some(size)), &paths[..]) {
+    let mut read = match (bokehcam_calibration::load_calibration_for(&paths, Some(size)), &paths[..]) {
         (Ok(calibration), _) => PairCalibration::Raw(Box::new(calibration)),
         // Not recognised and without a YAML extension: try `calib.txt`. A broken `.yml` keeps its own error.
         (Err(error), [file]) if !is_yaml(file) && is_unrecognized(&error) => match Geometry::read(file, pictures) {
             Ok(stated) => PairCalibration::Rectified { geometry: stated.scaled_to(file, size)?, made_for: stated.size },
             Err(RecordingError::Geometry { fault: GeometryFault::Unknown, .. }) => {
-                return Err(bokehcam_media::calibration::formats::unknown_format(file).into());
+                return Err(bokehcam_calibration::formats::unknown_format(file).into());
             }
             Err(error) => return Err(error.into()),
         },

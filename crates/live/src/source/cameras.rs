@@ -11,6 +11,7 @@ use crate::capture::Camera;
 use crate::capture::stereo_pair::StereoPair;
 use crate::capture::v4l2::V4l2Camera;
 use crate::depth::live::{LiveDepth, Units};
+use crate::layout::Content;
 use crate::v4l2::live::auto_lock::AutoLock;
 use crate::v4l2::live::{ModeRequest, OpenError, user_controls};
 use crate::v4l2::modes::{self, Rates, Sizes};
@@ -19,7 +20,6 @@ use crate::v4l2::{Device, controls, controls::Value};
 use bokehcam::clock::Clock;
 use bokehcam::depth::DepthSource;
 use bokehcam::depth::plate::CameraLock;
-use bokehcam_media::layout::Content;
 
 /// The sizes offered for a camera that supports a range of sizes.
 const USUAL_SIZES: [(u32, u32); 7] =

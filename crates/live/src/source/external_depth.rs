@@ -9,10 +9,10 @@ use super::{
     single_camera, video,
 };
 use crate::capture::{CaptureError, FrameData};
+use crate::depth::looped_recording::LoopedRecording;
+use crate::depth::map_sequence::SequenceDepth;
 use bokehcam::clock::Clock;
 use bokehcam::depth::DepthSource;
-use bokehcam_media::depth::looped_recording::LoopedRecording;
-use bokehcam_media::depth::map_sequence::SequenceDepth;
 use bokehcam_media::recording::map_sequence::{MapSequence, Pictured};
 use bokehcam_media::video::VideoFile;
 

@@ -13,12 +13,12 @@ use crate::capture::photo::Photo;
 use crate::capture::replay::Replay;
 use crate::capture::synthetic::{self, Format};
 use crate::capture::y4m::Y4m;
+use crate::depth::recorded::RecordedDepth;
 use bokehcam::compute::thread_pool::core_count;
 use bokehcam::depth::DepthSource;
 use bokehcam::depth::constant::ConstantDepth;
 use bokehcam::depth::misalignment::Misalignment;
 use bokehcam::frame::DepthMap;
-use bokehcam_media::depth::recorded::RecordedDepth;
 use bokehcam_media::recording::depth_file::describe_stretch;
 use bokehcam_media::recording::{Recording, StereoGeometry};
 

@@ -12,11 +12,11 @@ use std::str::FromStr;
 use clap::Args;
 
 use super::{SourceError, video::is_video};
+use crate::layout::FourCc;
 use bokehcam::depth::stereo::Settings;
 use bokehcam::look::number::{in_range_parser, parse_count, parse_positive, parse_switch, whole_number_parser};
 use bokehcam::look::{LookFacts, Metres};
 use bokehcam::names;
-use bokehcam_media::layout::FourCc;
 use bokehcam_media::recording::depth_file::{self, Fit};
 use bokehcam_media::recording::map_sequence::is_map_folder;
 use bokehcam_media::recording::{DepthUnit, is_recording_file};

@@ -13,5 +13,5 @@ pub mod node;
 pub mod queue;
 pub mod reader_monitor;
 
-pub use bokehcam_media::layout::{FourCc, Layout};
+pub use crate::layout::{FourCc, Layout};
 pub use device::Device;

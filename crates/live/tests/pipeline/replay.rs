@@ -13,10 +13,10 @@ use bokehcam_live::capture::demo::{self, Demo};
 use bokehcam_live::capture::replay::{PlayRange, Replay};
 use bokehcam_live::capture::synthetic::Format;
 use bokehcam_live::capture::{Camera, CaptureError, Captured, FrameBuffers, FrameData};
+use bokehcam_live::depth::looped_recording::LoopedRecording;
+use bokehcam_live::depth::recorded::RecordedDepth;
 use bokehcam_live::pipeline::{Pace, Run, run};
 use bokehcam_live::sink::{Sink, Target};
-use bokehcam_media::depth::looped_recording::LoopedRecording;
-use bokehcam_media::depth::recorded::RecordedDepth;
 use bokehcam_media::recording::tum::{Writer, WriterOptions};
 use bokehcam_media::recording::{Options, Recording};
 

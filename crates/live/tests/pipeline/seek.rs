@@ -11,10 +11,10 @@ use bokehcam::link::demand::Demand;
 use bokehcam::link::{self, Receiver};
 use bokehcam_live::capture::replay::{PlayRange, Replay};
 use bokehcam_live::capture::{Camera, Captured, FrameBuffers, FrameData};
+use bokehcam_live::depth::looped_recording::LoopedRecording;
+use bokehcam_live::depth::recorded::RecordedDepth;
 use bokehcam_live::pipeline::{Pace, Run, View, run};
 use bokehcam_live::sink::Target;
-use bokehcam_media::depth::looped_recording::LoopedRecording;
-use bokehcam_media::depth::recorded::RecordedDepth;
 use bokehcam_media::recording::{Options, Recording, Scratch};
 
 use crate::fakes::fake_bokeh;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::fault::{GeometryFault, LineFault, PictureFault};
 use bokehcam::calibration::CalibrationError;
+use bokehcam::depth::DepthError;
 use bokehcam_files::folder::FolderError;
 
 /// Result of reading or writing a recording or a picture.
@@ -181,5 +182,11 @@ impl RecordingError {
     /// Returns a closure for `map_err` that creates [`RecordingError::Picture`] for `path`.
     pub(super) fn picture(path: &Path) -> impl FnOnce(PictureFault) -> Self {
         move |fault| Self::Picture { path: path.to_owned(), fault }
+    }
+}
+
+impl From<RecordingError> for DepthError {
+    fn from(error: RecordingError) -> Self {
+        Self::File(error.into())
     }
 }

@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
+use super::MAX_SIDE_PX;
 use super::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 use super::completeness::{Expected, is_cut_gif, is_loss};
 use super::{VideoError, VideoFile};
-use crate::layout::MAX_SIDE_PX;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam_files::pipe_reader::{Filled, PipeReader};
 use bokehcam_files::process::{Process, Watchdog};

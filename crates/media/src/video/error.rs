@@ -3,7 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::layout::MAX_SIDE_PX;
+use super::MAX_SIDE_PX;
+use bokehcam::depth::DepthError;
 use bokehcam_files::input;
 
 /// Why a video file delivers no picture.
@@ -83,5 +84,11 @@ impl VideoError {
             io::ErrorKind::NotFound => Self::NoFfmpeg { path: path.to_owned() },
             _ => Self::io(path)(source),
         }
+    }
+}
+
+impl From<VideoError> for DepthError {
+    fn from(error: VideoError) -> Self {
+        Self::File(error.into())
     }
 }

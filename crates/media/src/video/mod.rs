@@ -14,3 +14,6 @@ mod probe;
 pub use decoder::{Conversion, Decoded, Decoder, Pixels};
 pub use error::VideoError;
 pub use probe::VideoFile;
+
+/// Largest width and height of the pictures of videos and cameras, in pixels.
+pub const MAX_SIDE_PX: u32 = 8192;

@@ -174,13 +174,13 @@ fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck
 fn rectifying_makes_real_pairs_rectified() {
     let cameras = ["cam0", "cam1"].map(|eye| format!("stereo_seq/MicroEurocDataset/mav0/{eye}"));
     let sensors = cameras.each_ref().map(|camera| data(&format!("{camera}/sensor.yaml")));
-    let euroc = bokehcam_media::calibration::load_calibration(&[&sensors[0], &sensors[1]]).unwrap();
+    let euroc = bokehcam_calibration::load_calibration(&[&sensors[0], &sensors[1]]).unwrap();
     let found = rectified(&euroc, cameras.map(|camera| gray(&format!("{camera}/data/1403715276262142976.png"))));
     assert!(found.vertical_px.abs() < 0.3 && found.verdict() == Verdict::Rectified, "{found:?}");
 
     // The author's left camera stands on the right.
     let given =
-        bokehcam_media::calibration::load_calibration(&[&data("calib/intrinsics.yml")]).unwrap().with_swapped_cameras();
+        bokehcam_calibration::load_calibration(&[&data("calib/intrinsics.yml")]).unwrap().with_swapped_cameras();
     for rig in [given, StereoCalibration { stored_rectification: None, ..given }] {
         let boards = [6, 9, 12].map(|k| [format!("calib/right{k:02}.jpg"), format!("calib/left{k:02}.jpg")]);
         for board in boards {

@@ -2,12 +2,12 @@
 
 use super::finding::Finding;
 use super::system::System;
+use bokehcam_live::layout::Content;
 use bokehcam_live::v4l2::controls::{self, LOW_LIGHT_CONTROL, Value};
 use bokehcam_live::v4l2::holders::{Holder, list_holders};
 use bokehcam_live::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, list_modes};
 use bokehcam_live::v4l2::node::{Kind, Node};
 use bokehcam_live::v4l2::{Device, controls::Control};
-use bokehcam_media::layout::Content;
 
 pub const TOPIC: &str = "camera";
 

@@ -5,7 +5,7 @@ const SIZE: (usize, usize) = (6, 4);
 /// Decodes a picture of [`SIZE`] in these planes with these strides.
 fn decode(fourcc: &[u8; 4], planes: &[&[u8]], strides_bytes: &[usize]) -> Result<Vec<u8>, String> {
     let (sender, mut receiver) = link::live();
-    let any = ModeRequest::for_content(bokehcam_media::layout::Content::Color);
+    let any = ModeRequest::for_content(crate::layout::Content::Color);
     let mut decoder = PictureDecoder::new(any, sender);
     let size = (SIZE.0 as u32, SIZE.1 as u32);
     decoder.set_format(&NegotiatedFormat { fourcc: *fourcc, size, rate: (30, 1) });
@@ -84,7 +84,7 @@ fn modes_are_ranked_as_those_of_other_cameras() {
         let NegotiatedFormat { fourcc, size, rate } = picture_decoder.choose_mode(&modes).unwrap();
         format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
     };
-    let any = ModeRequest::for_content(bokehcam_media::layout::Content::Color);
+    let any = ModeRequest::for_content(crate::layout::Content::Color);
     let format = |fourcc: &str| ModeRequest { fourcc: Some(fourcc.parse().unwrap()), ..any };
     assert_eq!(chosen(format("YUYV")), "YUYV (1280, 720) 30/1");
     assert_eq!(chosen(format("NV12")), "NV12 (1280, 720) 30/1");

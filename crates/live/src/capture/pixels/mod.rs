@@ -16,8 +16,8 @@ mod tests;
 mod transfer;
 mod ycc;
 
+use crate::layout::{Content, Family, FourCc, Layout, Transfer};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::{Content, Family, FourCc, Layout, Transfer};
 
 /// Decodes the pictures of one layout, with its own buffers.
 #[derive(Debug)]

@@ -5,8 +5,8 @@ use pulp::{Arch, Simd, WithSimd};
 use super::PixelError;
 use super::transfer::{self, Table};
 use super::ycc::{self, Coefficients};
+use crate::layout::{Component, Family, Layout, Range};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::{Component, Family, Layout, Range};
 
 /// Decodes raw pictures row by row, so that intermediate rows stay in the cache.
 #[derive(Debug)]

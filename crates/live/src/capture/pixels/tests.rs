@@ -1,8 +1,8 @@
 //! Comparison with floating-point reference implementations, on pseudo-random bytes.
 
 use super::*;
+use crate::layout::Range;
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::layout::Range;
 
 /// A deterministic pseudo-random generator.
 pub(super) struct Random(pub u64);

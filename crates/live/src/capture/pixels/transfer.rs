@@ -1,7 +1,7 @@
 //! Lookup tables that convert a camera's RGB codes to sRGB, by its transfer curve and range.
 
+use crate::layout::{Range, Transfer};
 use bokehcam::color::linear_to_srgb;
-use bokehcam_media::layout::{Range, Transfer};
 
 /// A new byte for each byte.
 pub(super) type Table = [u8; 256];

@@ -7,8 +7,8 @@
 //! Chroma comes in with 8 fractional bits, colours go out with 5, so that every product fits and a colour is within one
 //! code value of the exact one.
 
+use crate::layout::Range;
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::layout::Range;
 
 /// Fractional bits of colours before rounding.
 const COLOR_BITS: u32 = 5;

@@ -2,9 +2,9 @@
 
 use super::header::{Chroma, Header};
 use crate::capture::pixels::Decoder;
+use crate::layout::{FourCc, Layout, LayoutError, Plane, Range, Transfer};
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::{FourCc, Layout, LayoutError, Plane, Range, Transfer};
 
 /// Converts the pictures of one stream. Y'CbCr is BT.601 or BT.709 by the number of rows, as players assume: the
 /// format does not say it.

@@ -1,6 +1,6 @@
 //! The header of a YUV4MPEG2 stream (y4m of the mjpegtools, `man yuv4mpeg`), with ffmpeg's `XCOLORRANGE`.
 
-use bokehcam_media::layout::{MAX_SIDE_PX, Range};
+use crate::layout::{MAX_SIDE_PX, Range};
 
 /// The first word of a stream.
 pub const MAGIC: &str = "YUV4MPEG2";

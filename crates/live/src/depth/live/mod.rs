@@ -11,12 +11,12 @@ use std::time::Duration;
 
 pub use units::Units;
 
+use crate::layout::Content;
 use crate::v4l2::live::{LiveDevice, ModeRequest, Next, OpenError};
 use bokehcam::calibration::registration::AnySizeRegistration;
 use bokehcam::clock::Clock;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
-use bokehcam_media::layout::Content;
 use pairing::Pairing;
 
 /// Divisor of the depth period: how long a frame waits for a better matching map.

@@ -1,8 +1,8 @@
 //! Converts 16-bit depth to metres.
 
+use crate::layout::Family;
 use crate::v4l2::Layout;
 use bokehcam::frame::DepthMap;
-use bokehcam_media::layout::Family;
 
 /// The unit of a depth camera's numbers. 0 and the largest number, at which sensors clip, are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,11 +4,11 @@
 
 use std::io::{self, Write};
 
+use crate::layout::Range;
 use crate::sink::interleave_alpha;
 use crate::sink::yuv::Converter;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::Range;
 
 /// Time stamps are in microseconds.
 const TICK_NS: u64 = 1000;

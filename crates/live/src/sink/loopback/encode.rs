@@ -1,11 +1,11 @@
 //! Encodes pictures in V4L2 pixel layouts; Y'CbCr in BT.601, limited range.
 
+use crate::layout::Range;
 use crate::sink::yuv::Converter;
 use crate::sink::yuyv;
 use crate::v4l2::loopback::Layout;
 use bokehcam::color::YcbcrMatrix;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::Range;
 
 /// Encodes pictures in one layout.
 pub(super) struct Encoder {

@@ -3,12 +3,12 @@
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
+use crate::layout::{Family, FourCc, Layout};
 use crate::pipewire::mode::{Mode, NegotiatedFormat, Offer};
 use crate::pipewire::node::PictureMemory;
 use crate::sink::{raw, yuyv};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::fit::Letterbox;
-use bokehcam_media::layout::{Family, FourCc, Layout};
 
 /// At least the quality of usual cameras.
 const JPEG_QUALITY: u8 = 90;

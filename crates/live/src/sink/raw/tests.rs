@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::capture::pixels::Decoder;
+use crate::layout::FourCc;
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::layout::FourCc;
 
 fn noise(width: u32, height: u32) -> ColorImage {
     let mut state = 5_u64;

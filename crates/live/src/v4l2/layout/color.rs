@@ -2,8 +2,8 @@
 
 use v4l::v4l_sys as sys;
 
+use crate::layout::{ColorEncoding, Family, Range, Transfer};
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::layout::{ColorEncoding, Family, Range, Transfer};
 
 /// Resolves a format's colour codes; a code that is 0 or unknown takes V4L2's default for the colour space. SMPTE 240M,
 /// an early HD standard, counts as BT.709.

@@ -6,7 +6,7 @@ mod tests;
 
 use v4l::v4l_sys as sys;
 
-use bokehcam_media::layout::{Family, FourCc, Layout, LayoutError, MAX_PLANES, Plane};
+use crate::layout::{Family, FourCc, Layout, LayoutError, MAX_PLANES, Plane};
 
 /// The fields shared by the kernel's single- and multi-planar structures, unchecked.
 struct RawFormat {

@@ -1,7 +1,7 @@
 use super::*;
+use crate::layout::{Family, FourCcError, Range, Transfer};
 use crate::v4l2::device::zeroed;
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::layout::{Family, FourCcError, Range, Transfer};
 
 /// A single-planar format as a driver fills it in.
 fn single(fourcc: FourCc, width: u32, height: u32, stride_bytes: u32, size_bytes: u32) -> sys::v4l2_format {

@@ -4,11 +4,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::negotiate::NoMode;
+use crate::layout::LayoutError;
 use crate::v4l2::controls::ControlError;
 use crate::v4l2::holders::{Holder, list_holders};
 use crate::v4l2::node::NodeError;
 use crate::v4l2::queue::QueueError;
-use bokehcam_media::layout::LayoutError;
 
 /// Why a camera cannot be opened.
 #[allow(missing_docs)] // The messages say what the fields are.

@@ -22,11 +22,11 @@ use low_rate::LowRateCheck;
 use session::Session;
 use watchdog::Watchdog;
 
+use crate::layout::Layout;
 use crate::v4l2::controls;
 use crate::v4l2::node;
 use crate::v4l2::queue::{Losses, Planes};
 use bokehcam::clock::Clock;
-use bokehcam_media::layout::Layout;
 
 /// A device node that delivers frames.
 pub struct LiveDevice {

@@ -2,9 +2,9 @@
 
 use std::cmp::Ordering;
 
+use crate::layout::{Content, Family};
 use crate::v4l2::FourCc;
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
-use bokehcam_media::layout::{Content, Family};
 
 /// Constraints on a camera's mode. Open ones are chosen automatically.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,13 +7,13 @@ use v4l::v4l_sys as sys;
 
 use super::error::OpenError;
 use super::negotiate::{Choice, LinkSpeed, ModeRequest, rank_modes};
+use crate::layout::{Layout, LayoutError};
 use crate::v4l2::device::{Device, node_caps, zeroed};
 use crate::v4l2::modes::{Interval, QueueKind, list_modes};
 use crate::v4l2::node::{LOOPBACK_DRIVER, decode_text};
 use crate::v4l2::queue::{DeviceKernel, Queue, Writer};
 use crate::v4l2::{controls, layout, node};
 use bokehcam::clock::Clock;
-use bokehcam_media::layout::{Layout, LayoutError};
 
 /// A control's name and value, as text.
 pub type Setting = (String, String);

@@ -6,9 +6,9 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use bokehcam::color::YcbcrMatrix;
+use bokehcam_live::layout::Range;
 use bokehcam_live::sink::yuv::Converter;
 use bokehcam_live::sink::{Ending, Sink, Y4m};
-use bokehcam_media::layout::Range;
 
 use super::{PERIOD_NS, flat, open, options, picture};
 

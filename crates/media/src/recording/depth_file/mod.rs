@@ -21,7 +21,8 @@ pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, has_other_view, read_inside};
 pub(super) use stated::scale_beside;
 pub use unit::DepthUnit;
-pub(crate) use values::has_colors;
+#[doc(hidden)]
+pub use values::has_colors;
 
 use super::coded::EncodedPicture;
 use super::decoders::guard;

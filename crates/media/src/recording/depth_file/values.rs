@@ -129,7 +129,7 @@ impl ColorCount {
 }
 
 /// Returns whether pixels of 8-bit RGB are in colours, so that they are no depth.
-pub(crate) fn has_colors(rgb: &[u8]) -> bool {
+pub fn has_colors(rgb: &[u8]) -> bool {
     let mut colors = ColorCount::new(Samples::Eight.white());
     rgb.as_chunks::<3>().0.iter().for_each(|rgb| colors.add(rgb.map(f32::from)));
     colors.check(rgb.len() / 3).is_err()

@@ -103,7 +103,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     }
     let sensors = [left, right].map(|camera| dir.join(camera.sensor));
     let stereo_geometry = match sensors.iter().any(|sensor| sensor.exists()) {
-        true => StereoGeometry::Raw(Box::new(crate::calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
+        true => StereoGeometry::Raw(Box::new(bokehcam_calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
         false => StereoGeometry::Uncalibrated,
     };
     Ok(Contents {

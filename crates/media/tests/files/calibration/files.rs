@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use bokehcam::calibration::{Distortion, LengthUnit, StereoCalibration};
-use bokehcam_media::calibration::euroc;
+use bokehcam_calibration::euroc;
 use glam::{DVec2, DVec3};
 use tempfile::TempDir;
 
@@ -116,8 +116,7 @@ fn load_some(files: &[(&str, &str)], count: usize, size: Option<(u32, u32)>) -> 
     let (dir, paths) = folder(files);
     let paths: Vec<&Path> = paths.iter().take(count).map(PathBuf::as_path).collect();
     let folder = format!("{}/", dir.path().display());
-    bokehcam_media::calibration::load_calibration_for(&paths, size)
-        .map_err(|error| error.to_string().replace(&folder, ""))
+    bokehcam_calibration::load_calibration_for(&paths, size).map_err(|error| error.to_string().replace(&folder, ""))
 }
 
 fn sensor(shift: &str) -> String {
@@ -132,11 +131,7 @@ fn opencv_in_one_file_or_two() {
     assert_eq!(one, load(&[("b.yml", EXTRINSICS), ("a.yml", INTRINSICS)]).unwrap());
     let (_dir, paths) = folder(&[("my_intrinsics.yml", INTRINSICS), ("my_extrinsics.yml", EXTRINSICS)]);
     for path in &paths {
-        assert_eq!(
-            one,
-            bokehcam_media::calibration::load_calibration(&[path]).unwrap(),
-            "the other one lies beside it"
-        );
+        assert_eq!(one, bokehcam_calibration::load_calibration(&[path]).unwrap(), "the other one lies beside it");
     }
 
     assert!(
@@ -184,7 +179,7 @@ fn opencv_by_other_names_and_with_a_size() {
 fn euroc_and_kalibr() {
     let (_dir, paths) = folder(&[("cam0.yaml", &sensor("-0.06")), ("cam1.yaml", &sensor("0.05"))]);
     let rig = euroc::read_sensors(&paths[0], &paths[1]).unwrap();
-    assert_eq!(rig, bokehcam_media::calibration::load_calibration(&[&paths[0], &paths[1]]).unwrap());
+    assert_eq!(rig, bokehcam_calibration::load_calibration(&[&paths[0], &paths[1]]).unwrap());
     assert_eq!(rig.cameras[0].size, Some((752, 480)));
     assert!(!rig.is_swapped() && rig.unit == LengthUnit::Stated);
     // 11 cm along the body's y, which is the cameras' x.
@@ -257,9 +252,9 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         let refusal = load(&files).expect_err(what);
         assert!(refusal.contains(what) && !refusal.contains('\n'), "{refusal}, not {what}");
     }
-    let refusal = bokehcam_media::calibration::load_calibration(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
+    let refusal = bokehcam_calibration::load_calibration(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
     assert!(refusal.contains("nowhere.yml: "), "{refusal}");
-    assert!(bokehcam_media::calibration::load_calibration(&[]).unwrap_err().to_string().contains("one or two files"));
+    assert!(bokehcam_calibration::load_calibration(&[]).unwrap_err().to_string().contains("one or two files"));
 }
 
 #[test]

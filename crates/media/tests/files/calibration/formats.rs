@@ -1,7 +1,7 @@
 //! The same rig in every format, and what is lacking in a file of none.
 
 use bokehcam::calibration::{Distortion, LengthUnit, StereoCalibration};
-use bokehcam_media::calibration::formats::FORMATS;
+use bokehcam_calibration::formats::FORMATS;
 use glam::{DVec2, DVec3};
 
 use super::files::{load, load_first, load_for};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bokehcam::calibration::rectification::Rectification;
 use bokehcam::calibration::{LengthUnit, StereoCalibration};
-use bokehcam_media::calibration::euroc;
+use bokehcam_calibration::euroc;
 use glam::{DMat3, DVec2};
 
 fn data() -> PathBuf {
@@ -20,7 +20,7 @@ fn apart_deg(a: DMat3, b: DMat3) -> f64 {
 #[ignore = "needs BOKEHCAM_DATA, a folder with calib/intrinsics.yml"]
 fn opencvs_own_rectification_is_ours() {
     let file = data().join("calib/extrinsics.yml");
-    let rig = bokehcam_media::calibration::load_calibration(&[&file]).unwrap();
+    let rig = bokehcam_calibration::load_calibration(&[&file]).unwrap();
     assert!(rig.is_swapped() && rig.unit == LengthUnit::AssumedMillimetres);
     assert!((rig.baseline_m() - 0.09205).abs() < 1e-4, "{}", rig.baseline_m());
     let rig = rig.with_swapped_cameras();

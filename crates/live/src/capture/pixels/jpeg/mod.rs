@@ -11,9 +11,9 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::PixelError;
+use crate::layout::Layout;
 use bokehcam::compute::catch_panic;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::Layout;
 use bokehcam_media::recording::jpeg_repair::repair_jpeg;
 
 /// Decodes JPEGs; keeps the buffer for the repaired file.

@@ -3,8 +3,8 @@
 
 use super::super::tests::Random;
 use super::super::{Decoder, PixelError};
+use crate::layout::{FourCc, Layout};
 use bokehcam::frame::ColorImage;
-use bokehcam_media::layout::{FourCc, Layout};
 
 const FILES: [(&str, &[u8]); 5] = [
     ("4:2:0", include_bytes!("testdata/420.jpg")),

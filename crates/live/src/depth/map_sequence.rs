@@ -1,9 +1,9 @@
 //! Depth maps in files of their own, paired with the frames by their number.
 
-use crate::recording::map_sequence::MapSequence;
 use bokehcam::calibration::registration::AnySizeRegistration;
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
+use bokehcam_media::recording::map_sequence::MapSequence;
 
 /// Reads the depth of each frame from the map of the same number.
 pub struct SequenceDepth {

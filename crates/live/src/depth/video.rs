@@ -2,20 +2,14 @@
 
 use std::time::Duration;
 
-use crate::recording::depth_covers;
-use crate::recording::depth_file::has_colors;
-use crate::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
+use bokehcam_media::recording::depth_covers;
+use bokehcam_media::recording::depth_file::has_colors;
+use bokehcam_media::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// How long one call of the decoder waits.
 const PATIENCE: Duration = Duration::from_millis(100);
-
-impl From<VideoError> for DepthError {
-    fn from(error: VideoError) -> Self {
-        Self::File(error.into())
-    }
-}
 
 /// Reads the depth of each frame from the frame of the same number of a video: luma is relative inverse depth.
 pub struct VideoDepth {

@@ -2,15 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::recording::{Recording, RecordingError, Scratch};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
-
-impl From<RecordingError> for DepthError {
-    fn from(error: RecordingError) -> Self {
-        Self::File(error.into())
-    }
-}
+use bokehcam_media::recording::{Recording, Scratch};
 
 /// The depth pictures of a recording.
 pub struct RecordedDepth {

@@ -1,8 +1,8 @@
 //! Depth of a recording for colour frames of another source: paired by media time, played in a loop.
 
-use crate::recording::{Recording, Scratch};
 use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
+use bokehcam_media::recording::{Recording, Scratch};
 
 /// Plays the depth images of a recording in a loop, paired with colour frames by media time.
 pub struct LoopedRecording {
@@ -66,7 +66,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::recording::Options;
+    use bokehcam_media::recording::Options;
 
     #[test]
     fn each_time_has_the_frame_that_is_shown_then_lap_after_lap() {

@@ -4,11 +4,9 @@ mod color;
 mod fourcc;
 
 use bokehcam::color::YcbcrMatrix;
+pub use bokehcam_media::video::MAX_SIDE_PX;
 pub use color::{ColorEncoding, Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
-
-/// Largest width and height accepted, in pixels, as a bound on what a driver may claim.
-pub const MAX_SIDE_PX: u32 = 8192;
 
 /// Maximum number of memory planes and components of a supported format.
 pub const MAX_PLANES: usize = 3;
