@@ -1,5 +1,3 @@
-//! Files for bokehcam: what they hold becomes the engine's pictures and maps. [`recording`] reads and writes recordings,
-//! photos and maps; [`video`] decodes through ffmpeg. Neither imports the other.
+//! Files for bokehcam: what recordings, photos and depth maps hold becomes the engine's pictures and maps.
 
 pub mod recording;
-pub mod video;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::experiment::codec;
 use bokehcam::frame::ColorImage;
 use bokehcam_media::recording::still;
-use bokehcam_media::video::VideoFile;
+use bokehcam_video::VideoFile;
 
 use super::Outcome;
 

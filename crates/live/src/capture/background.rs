@@ -8,7 +8,7 @@ use super::video::Video;
 use super::{Camera, CaptureError, Captured, FrameBuffers};
 use bokehcam::depth::backdrop::{BackgroundVideo, cover_size};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam_media::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
+use bokehcam_video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// Largest side of a video's first picture, in pixels.
 const MAX_FIRST_PX: u32 = 4096;

@@ -5,7 +5,7 @@ use std::error::Error;
 use super::pixels::NoColor;
 use bokehcam::frame::transform::Area;
 use bokehcam_media::recording::RecordingError;
-use bokehcam_media::video::VideoError;
+use bokehcam_video::VideoError;
 
 /// Why a source delivers no frame.
 #[allow(missing_docs)] // The messages say what the fields are.

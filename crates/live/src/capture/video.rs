@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::replay::PlayRange;
 use super::{Camera, CaptureError, Captured, FrameBuffers, FrameData, MAX_WAIT, Seeker, SourceInfo};
 use bokehcam::frame::{ColorImage, Stamp};
-use bokehcam_media::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
+use bokehcam_video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// Largest number of frames of a video that can be sought in: two days at 30 per second, or 40 MiB of times.
 const MAX_SEEK_FRAMES: u64 = 5 << 20;

@@ -6,7 +6,7 @@ use bokehcam::depth::{DepthError, DepthSource, FrameInput};
 use bokehcam::frame::DepthMap;
 use bokehcam_media::recording::depth_covers;
 use bokehcam_media::recording::depth_file::has_colors;
-use bokehcam_media::video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
+use bokehcam_video::{Conversion, Decoded, Decoder, Pixels, VideoError, VideoFile};
 
 /// How long one call of the decoder waits.
 const PATIENCE: Duration = Duration::from_millis(100);

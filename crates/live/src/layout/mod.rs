@@ -4,7 +4,7 @@ mod color;
 mod fourcc;
 
 use bokehcam::color::YcbcrMatrix;
-pub use bokehcam_media::video::MAX_SIDE_PX;
+pub use bokehcam_video::MAX_SIDE_PX;
 pub use color::{ColorEncoding, Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
 

@@ -14,7 +14,7 @@ use crate::depth::map_sequence::SequenceDepth;
 use bokehcam::clock::Clock;
 use bokehcam::depth::DepthSource;
 use bokehcam_media::recording::map_sequence::{MapSequence, Pictured};
-use bokehcam_media::video::VideoFile;
+use bokehcam_video::VideoFile;
 
 /// Adds the depth that `--depth` names to `source`, if it is external; otherwise returns the source unchanged. The
 /// source is transformed already.

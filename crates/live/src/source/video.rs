@@ -13,7 +13,7 @@ use bokehcam::depth::DepthError;
 use bokehcam_files::input;
 use bokehcam_media::recording::depth_file::has_same_view;
 use bokehcam_media::recording::still;
-use bokehcam_media::video::{VideoError, VideoFile};
+use bokehcam_video::{VideoError, VideoFile};
 
 /// Beginnings of video files: an offset, and the bytes there.
 const SIGNATURES: [(usize, &[u8]); 13] = [

@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use std::str::FromStr;
 
 use bokehcam::frame::ColorImage;
-use bokehcam_media::video::command::{FFMPEG, base_command, file_url};
+use bokehcam_video::command::{FFMPEG, base_command, file_url};
 
 /// Bit rate of a call.
 const RATE: &str = "1M";

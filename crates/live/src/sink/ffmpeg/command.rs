@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use crate::sink::Sound;
 use bokehcam::color::YcbcrMatrix;
-use bokehcam_media::video::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
+use bokehcam_video::command::{FFMPEG, INPUT_OPTIONS, base_command, file_url, frame_timing_option};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Container {
