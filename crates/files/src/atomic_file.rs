@@ -51,6 +51,7 @@ impl PartFile {
         &self.path
     }
 
+    /// Returns the path that it has until it is whole.
     pub fn part_path(&self) -> &Path {
         &self.part
     }

@@ -21,6 +21,7 @@ use super::{input, lock};
 const LIST_NAME: &str = ".bokehcam";
 
 /// An error in writing a folder.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// The folder is not empty, and nothing may be replaced.
@@ -36,6 +37,7 @@ pub enum FolderError {
     /// The folder was removed or moved meanwhile.
     #[error("the folder {} was removed or moved meanwhile", path.display())]
     Gone { path: PathBuf },
+    /// An operating system error.
     #[error("cannot write {}: {cause}", path.display())]
     Write {
         /// The file or folder.

@@ -11,7 +11,9 @@ use super::input;
 /// The default folders of snapshots and recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Folders {
+    /// Of snapshots.
     pub pictures: PathBuf,
+    /// Of recordings.
     pub videos: PathBuf,
 }
 
