@@ -36,6 +36,15 @@ fn the_track_marked_as_default_is_played() {
 }
 
 #[test]
+fn two_files_are_made_one() {
+    let home = Home::new();
+    ["left.mp4", "right.mp4"].iter().for_each(|file| fs::write(home.path(file), "").unwrap());
+    let said = ["two files are no source", "ffmpeg -i left.mp4 -i right.mp4 -filter_complex hstack", "--side-by-side"];
+    home.run(&["stream", "left.mp4,right.mp4", "--to", "null"]).refused(2, &said);
+    home.run(&["stream", "left.mp4,nothing.mp4", "--to", "null"]).refused(1, &["nothing.mp4"]);
+}
+
+#[test]
 #[ignore = "needs ffmpeg"]
 fn no_frame_is_lost_to_a_start_that_is_rounded() {
     let home = Home::new();

@@ -1,6 +1,7 @@
 //! Depth maps of photos.
 
 use std::fs;
+use std::io::Cursor;
 
 use bokehcam_media::recording::still;
 
@@ -160,6 +161,27 @@ fn the_folder_of_the_result_is_made() {
     let home = Home::new().with_photo();
     home.run(&["render", "photo.png", "--effect", "none", "--out", "a/b/out.png"]).done();
     assert!(home.path("a/b/out.png").is_file());
+}
+
+#[test]
+fn a_photo_with_the_picture_of_another_camera_says_what_to_do() {
+    let home = Home::new();
+    let jpeg = |shade: u8| {
+        let mut bytes = Cursor::new(Vec::new());
+        image::GrayImage::from_pixel(16, 16, [shade].into()).write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+        bytes.into_inner()
+    };
+    // An index (CIPA DC-007) in a segment of 66 bytes: the photo, and a picture whose kind is "disparity".
+    let (left, right) = (jpeg(90), jpeg(200));
+    let photo_bytes = left.len() as u32 + 66;
+    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+    let directory = [&b"II*\0\x08\0\0\0\x01\0\x02\xB0\x07\0"[..], &words(&[32, 26, 0])].concat();
+    let entries = words(&[0x3_0000, photo_bytes, 0, 0, 0x2_0002, right.len() as u32, photo_bytes - 10, 0]);
+    let file = [&left[..2], b"\xFF\xE2\0\x40MPF\0", &directory, &entries, &left[2..], &right].concat();
+    fs::write(home.path("two.mpo.jpg"), file).unwrap();
+    let ran = home.run(&["depth", "two.mpo.jpg", "--out", "map.png"]);
+    ran.refused(2, &["two.mpo.jpg: there is no depth inside, but a picture of another camera", "left and right"]);
+    home.run(&["render", "two.mpo.jpg", "--effect", "none", "--out", "left.png"]).done();
 }
 
 #[test]
