@@ -16,8 +16,7 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::look::{Effect, Look};
 use bokehcam_live::capture::{FrameBuffers, FrameData};
 use bokehcam_live::source::{Options, Source, SourceName};
-use bokehcam_media::recording::RecordingWriter;
-use bokehcam_media::recording::tum::RecordingSummary;
+use bokehcam_media::recording::{RecordingSummary, RecordingWriter};
 
 /// Record a source in the TUM RGB-D layout, or as an MCAP file of ROS 2
 ///

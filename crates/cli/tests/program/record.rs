@@ -9,8 +9,8 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam_media::recording::RecordingWriter;
 use bokehcam_media::recording::still::write_color;
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
 use bokehcam_media::recording::{Options, Recording, Scratch};
 use rustix::process::Signal;
 
@@ -45,7 +45,7 @@ fn names(dir: &Path) -> Vec<String> {
 
 /// Creates a recording of `frames` frames in `dir`, of a uniform `shade` and depth.
 fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
-    let mut writer = Writer::create(dir, &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(dir, false).unwrap();
     let color = ColorImage { width: 24, height: 16, rgb: vec![shade; 24 * 16 * 3] };
     let depth = DepthMap { width: 24, height: 16, metres: vec![metres; 24 * 16], ..DepthMap::default() };
     (0..frames).for_each(|frame| writer.add(frame * 100_000_000, &color, Some(&depth)).unwrap());

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::RecordingWriter;
 use bokehcam_media::recording::{Options, Recording, Scratch};
 
 fn path(folder: &Path) -> &str {
@@ -61,7 +61,7 @@ fn recording_of(left: &ColorImage, right: &GrayImage, more: u32) -> tempfile::Te
             wide.rgb[3 * (y * wide_px + width + x)..][..3].fill(right.luma[y * width + x]);
         }
     }
-    let mut writer = Writer::create(&folder.path().join("wide"), &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(&folder.path().join("wide"), false).unwrap();
     for frame in 0..2 {
         writer.add(frame * 33_000_000, &wide, None).unwrap();
     }

@@ -17,7 +17,7 @@ use bokehcam_live::depth::looped_recording::LoopedRecording;
 use bokehcam_live::depth::recorded::RecordedDepth;
 use bokehcam_live::pipeline::{Pace, Run, run};
 use bokehcam_live::sink::{Sink, Target};
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::RecordingWriter;
 use bokehcam_media::recording::{Options, Recording};
 
 use crate::common::psnr_db;
@@ -29,7 +29,7 @@ pub const STEP_NS: u64 = 40_000_000;
 
 /// Writes ten frames at 25 per second; frame `n` has bytes of value `n` and a depth of 1 m plus `n` decimetres.
 pub fn record(dir: &Path, with_depth: bool) {
-    let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
+    let mut writer = RecordingWriter::create(dir, false).unwrap();
     for frame in 0..FRAMES {
         let mut color = ColorImage::new(SIZE.0, SIZE.1);
         color.rgb.fill(frame as u8);

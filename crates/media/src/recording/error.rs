@@ -1,5 +1,6 @@
 //! Errors of recordings and pictures: what is wrong, where, and what to do, in one line.
 
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -177,6 +178,11 @@ impl RecordingError {
     /// Returns a closure for `map_err` that creates [`RecordingError::Io`] for an action on `path`.
     pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |cause| Self::Io { action, path: path.to_owned(), cause }
+    }
+
+    /// Returns a closure for `map_err` that creates [`RecordingError::Unrecordable`] for frame `index`.
+    pub(super) fn unrecordable<E: Display>(index: usize) -> impl FnOnce(E) -> Self {
+        move |reason| Self::Unrecordable { index, reason: reason.to_string() }
     }
 
     /// Returns a closure for `map_err` that creates [`RecordingError::Picture`] for `path`.

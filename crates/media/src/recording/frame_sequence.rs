@@ -37,14 +37,10 @@ impl FrameSequence {
         self.count
     }
 
-    /// Returns the error that the next frame cannot be recorded.
-    pub fn refuse(&self, reason: impl std::fmt::Display) -> RecordingError {
-        RecordingError::Unrecordable { index: self.count, reason: reason.to_string() }
-    }
-
     /// Checks that a frame can be the next one.
     pub fn check(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
-        self.find_fault(time_ns, color, depth).map_or(Ok(()), |reason| Err(self.refuse(reason)))
+        let fault = self.find_fault(time_ns, color, depth);
+        fault.map_or(Ok(()), |reason| Err(RecordingError::unrecordable(self.count)(reason)))
     }
 
     fn find_fault(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Option<String> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::RecordingWriter;
 use rustix::process::Signal;
 
 use crate::common::{Numbers, color, depth};
@@ -34,7 +34,7 @@ impl Home {
 
     /// Creates a recording of `frames` noisy pictures at intervals of `period_s`.
     pub fn record(&self, name: &str, frames: u64, period_s: f64) {
-        let mut writer = Writer::create(&self.path(name), &WriterOptions::default()).unwrap();
+        let mut writer = RecordingWriter::create(&self.path(name), false).unwrap();
         for frame in 0..frames {
             let mut numbers = Numbers(frame + 1);
             let color = color(64, 48, |_, _| std::array::from_fn(|_| (numbers.next() * 256.0) as u8));

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::definitions::{CAMERA_INFO, COMPRESSED_IMAGE, MessageWriter};
 use super::file_writer::FileWriter;
 use crate::recording::encode;
-use crate::recording::error::RecordingError;
-use crate::recording::frame_sequence::{FrameSequence, RecordingSummary};
+use crate::recording::error::{RecordingError, Result};
+use crate::recording::writer::Storage;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam_files::atomic_file::{self, PartFile};
 
@@ -31,12 +31,8 @@ const FIRST_NS: u64 = 1_000_000_000;
 /// The program that writes, as the file states it.
 const LIBRARY: &str = concat!("bokehcam ", env!("CARGO_PKG_VERSION"));
 
-/// Writes a recording frame by frame, with memory for one chunk of it.
-///
-/// Colour is `sensor_msgs/msg/CompressedImage` (PNG), depth `compressedDepth` (16-bit PNG in millimetres, 0 = unknown),
-/// each with a `CameraInfo` that says that the camera is not calibrated. Times count from the first frame, which is at
-/// 1 s. The file gets its name when it is whole; [`Writer::finish`] or [`Writer::finish_incomplete`] must end it.
-pub struct Writer {
+/// A file that gets its name when it is whole. Times count from the first frame, which is at 1 s.
+pub(in crate::recording) struct Writer {
     path: PathBuf,
     part: PartFile,
     overwrite: bool,
@@ -49,19 +45,23 @@ pub struct Writer {
     depth: Option<[u16; 2]>,
     /// The time of the source that [`FIRST_NS`] stands for.
     begin_ns: Option<u64>,
-    frames: FrameSequence,
     message: MessageWriter,
     /// Working memory for encoding.
     units: Vec<u8>,
     picture: Vec<u8>,
 }
 
+/// What of a message does not change with its picture: number and time, and width and height.
+#[derive(Clone, Copy)]
+struct Stamp {
+    sequence: u32,
+    time_ns: u64,
+    size: (u32, u32),
+}
+
 impl Writer {
-    /// Starts the file `path`; `overwrite` allows to replace an existing one, once the new one is whole.
-    ///
-    /// # Errors
-    /// The file exists and may not be replaced, or cannot be written.
-    pub fn create(path: &Path, overwrite: bool) -> Result<Self, RecordingError> {
+    /// Starts the file `path`.
+    pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordingError::Exists { path: path.to_owned() });
         }
@@ -84,100 +84,74 @@ impl Writer {
             color,
             depth: None,
             begin_ns: None,
-            frames: FrameSequence::default(),
             message: MessageWriter::default(),
             units: Vec::new(),
             picture: Vec::new(),
         })
     }
 
-    /// Adds a frame at `time_ns`, in nanoseconds of any clock. Readers skip a frame without depth if others have it.
-    ///
-    /// # Errors
-    /// The frame does not fit the recording: its time is not after the last one, the size of the colour picture differs
-    /// from the first, or the depth map does not cover it. Or the file cannot be written.
-    pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
-        self.frames.check(time_ns, color, depth)?;
-        let stamp_ns = FIRST_NS + (time_ns - *self.begin_ns.get_or_insert(time_ns));
+    /// Writes `self.picture` after `head`, and the camera that took it.
+    fn write_pair(&mut self, [picture, camera]: [u16; 2], stamp: Stamp, format: &str, head: &[u8]) -> Result<()> {
+        let Stamp { sequence, time_ns, size } = stamp;
+        self.message.begin(time_ns, FRAME_ID);
+        self.message.text(format);
+        self.message.data(&[head, &self.picture]);
+        let written = self.file.write_message(picture, sequence, time_ns, self.message.bytes());
+        written.map_err(RecordingError::io("write", &self.path))?;
+        self.message.begin(time_ns, FRAME_ID);
+        self.message.uncalibrated_camera(size);
+        let written = self.file.write_message(camera, sequence, time_ns, self.message.bytes());
+        written.map_err(RecordingError::io("write", &self.path))
+    }
+}
+
+impl Storage for Writer {
+    fn add(&mut self, number: usize, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<()> {
+        let time_ns = FIRST_NS + (time_ns - *self.begin_ns.get_or_insert(time_ns));
+        let stamp = Stamp { sequence: number as u32, time_ns, size: color.size() };
         self.picture.clear();
-        encode::encode_color_png(color, &mut self.picture).map_err(|error| self.frames.refuse(error))?;
-        self.write_pair(self.color, stamp_ns, color.size(), COLOR_FORMAT, &[])?;
+        encode::encode_color_png(color, &mut self.picture).map_err(RecordingError::unrecordable(number))?;
+        self.write_pair(self.color, stamp, COLOR_FORMAT, &[])?;
         if let Some(depth) = depth {
             let (file, schemas) = (&mut self.file, self.schemas);
             let channels = *self.depth.get_or_insert_with(|| add_channels(file, schemas, DEPTH, "compressedDepth"));
             self.picture.clear();
-            encode::encode_depth_png(depth, super::DEPTH_SCALE, None, &mut self.units, &mut self.picture)
-                .map_err(|error| self.frames.refuse(error))?;
-            self.write_pair(channels, stamp_ns, depth.size(), DEPTH_FORMAT, &COMPRESSED_DEPTH_HEAD)?;
+            encode::encode_png_16bit(
+                depth.size(),
+                &depth.metres,
+                super::DEPTH_SCALE,
+                None,
+                &mut self.units,
+                &mut self.picture,
+            )
+            .map_err(RecordingError::unrecordable(number))?;
+            self.write_pair(channels, Stamp { size: depth.size(), ..stamp }, DEPTH_FORMAT, &COMPRESSED_DEPTH_HEAD)?;
         }
-        self.frames.add(time_ns, color, depth, self.max_depth_m());
         Ok(())
     }
 
-    /// Writes `self.picture` after `head`, and the camera that took it.
-    fn write_pair(
-        &mut self,
-        [picture, camera]: [u16; 2],
-        stamp_ns: u64,
-        size: (u32, u32),
-        format: &str,
-        head: &[u8],
-    ) -> Result<(), RecordingError> {
-        let sequence = self.frames.count() as u32;
-        self.message.begin(stamp_ns, FRAME_ID);
-        self.message.text(format);
-        self.message.data(&[head, &self.picture]);
-        let written = self.file.write_message(picture, sequence, stamp_ns, self.message.bytes());
-        written.map_err(RecordingError::io("write", &self.path))?;
-        self.message.begin(stamp_ns, FRAME_ID);
-        self.message.uncalibrated_camera(size);
-        let written = self.file.write_message(camera, sequence, stamp_ns, self.message.bytes());
-        written.map_err(RecordingError::io("write", &self.path))
-    }
-
-    /// Returns the number of frames so far.
-    pub fn frames(&self) -> usize {
-        self.frames.count()
-    }
-
-    /// Returns the largest depth that can be written, in metres.
-    pub fn max_depth_m(&self) -> f32 {
+    fn max_depth_m(&self) -> f32 {
         encode::max_value(super::DEPTH_SCALE)
     }
 
-    /// Completes the file, which gets its name.
-    ///
-    /// # Errors
-    /// No frame was added, or the file cannot be written.
-    pub fn finish(self) -> Result<RecordingSummary, RecordingError> {
-        let Self { path, part, overwrite, file, frames, .. } = self;
-        if frames.count() == 0 {
-            return Err(RecordingError::NothingRecorded { dir: path });
-        }
+    fn finish(self: Box<Self>) -> Result<u64> {
+        let Self { path, part, overwrite, file, .. } = *self;
         file.finish().map_err(RecordingError::io("write", &path))?;
         let replaced = u64::from(path.exists());
         part.commit(overwrite).map_err(|error| match error.kind() {
             ErrorKind::AlreadyExists => RecordingError::Exists { path: path.clone() },
             _ => RecordingError::io("write", &path)(error),
         })?;
-        Ok(RecordingSummary { replaced, ..frames.summary(&path) })
+        Ok(replaced)
     }
 
-    /// Ends a recording that was interrupted: it is kept beside the path as `NAME.incomplete.mcap`, and can be read.
-    ///
-    /// # Errors
-    /// No frame was added, or nothing can be kept.
-    pub fn finish_incomplete(self) -> Result<RecordingSummary, RecordingError> {
-        let Self { path, part, file, frames, .. } = self;
-        if frames.count() == 0 {
-            return Err(RecordingError::NothingRecorded { dir: path });
-        }
+    fn keep(self: Box<Self>) -> Result<PathBuf> {
+        let Self { path, part, file, .. } = *self;
         // Where its end cannot be written, what came before can be read all the same.
         if let Err(error) = file.finish() {
             tracing::warn!("{}", RecordingError::io("write", &path)(error));
         }
-        let kept = part.keep_incomplete().map_err(RecordingError::io("keep", &path))?;
-        Ok(frames.summary(&kept))
+        part.keep_incomplete().map_err(RecordingError::io("keep", &path))
     }
 }
 

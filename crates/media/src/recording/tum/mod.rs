@@ -15,8 +15,7 @@ mod writer;
 use std::path::Path;
 
 use super::contents::Layout;
-pub use super::frame_sequence::RecordingSummary;
-pub use writer::{Writer, WriterOptions};
+pub(super) use writer::Writer;
 
 /// Lists of colour pictures and depth maps.
 pub(super) const LAYOUT: Layout = Layout {

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam_media::recording::{DepthUnit, Options, Recording, RecordingError, RecordingWriter, Scratch, mcap};
+use bokehcam_media::recording::{DepthUnit, Options, Recording, RecordingError, RecordingWriter, Scratch};
 
 use super::{SIZE, Scene, assert_says, color_of, depth_of, times_ns};
 
@@ -330,7 +330,7 @@ fn a_written_file_replaces_another_only_when_it_is_whole() {
     assert_eq!(fs::read(&path).unwrap(), b"earlier");
     assert_eq!(write(&path, true).unwrap().finish().unwrap().replaced, 1);
     assert_eq!(Recording::open(&path, &Options::default()).unwrap().len(), 4);
-    let empty = mcap::Writer::create(&scene.path("empty.mcap"), false).unwrap();
+    let empty = RecordingWriter::create(&scene.path("empty.mcap"), false).unwrap();
     assert_says(empty.finish().map(drop), &["nothing was recorded"]);
     let left = fs::read_dir(scene.path("")).unwrap().filter(|entry| entry.as_ref().unwrap().path().is_file()).count();
     assert_eq!(left, 2, "no part is left behind");

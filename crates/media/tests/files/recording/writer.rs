@@ -3,8 +3,7 @@
 use std::fs;
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
-use bokehcam_media::recording::{Options, Recording, Unpaired};
+use bokehcam_media::recording::{Options, Recording, RecordingWriter, Unpaired};
 use tempfile::TempDir;
 
 use super::{SIZE, assert_says, color_of, depth_of, times_ns};
@@ -27,7 +26,7 @@ fn frame(seed: u32) -> (ColorImage, DepthMap) {
 fn colour_is_exact_and_depth_within_half_a_unit() {
     let dir = TempDir::new().unwrap();
     let dir = dir.path().join("new/folder");
-    let mut writer = Writer::create(&dir, &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(&dir, false).unwrap();
     let times = [1_305_031_102_175_304_001, 1_305_031_102_208_637_334, 1_305_031_102_275_304_000];
     for (seed, &time_ns) in (0..).zip(&times) {
         let (color, depth) = frame(seed);
@@ -56,7 +55,7 @@ fn depth_beyond_the_range_is_unknown_rather_than_wrong() {
     let dir = TempDir::new().unwrap();
     let (color, mut depth) = frame(0);
     depth.metres[..4].copy_from_slice(&[13.2, f32::NAN, f32::INFINITY, -1.0]);
-    let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(dir.path(), false).unwrap();
     writer.add(0, &color, Some(&depth)).unwrap();
     writer.finish().unwrap();
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
@@ -68,8 +67,7 @@ fn depth_may_be_absent_always_or_now_and_then() {
     let dir = TempDir::new().unwrap();
     let (color, depth) = frame(0);
     for (depths, len, unpaired) in [([false; 3], 3, 0), ([true, false, true], 2, 1), ([false, false, true], 1, 2)] {
-        let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
-        let mut writer = Writer::create(dir.path(), &options).unwrap();
+        let mut writer = RecordingWriter::create(dir.path(), true).unwrap();
         for (time_ms, has_depth) in (0..).step_by(33).zip(depths) {
             writer.add(time_ms * 1_000_000, &color, has_depth.then_some(&depth)).unwrap();
         }
@@ -84,7 +82,7 @@ fn depth_may_be_absent_always_or_now_and_then() {
 fn the_lists_appear_only_when_whole() {
     let dir = TempDir::new().unwrap();
     let (color, depth) = frame(0);
-    let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(dir.path(), false).unwrap();
     writer.add(5, &color, Some(&depth)).unwrap();
     assert_says(Recording::open(dir.path(), &Options::default()), &["not a recording"]);
     let written = writer.finish_incomplete().unwrap();
@@ -97,24 +95,23 @@ fn the_lists_appear_only_when_whole() {
 fn an_existing_recording_is_kept_unless_asked() {
     let dir = TempDir::new().unwrap();
     let (color, depth) = frame(0);
-    let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(dir.path(), false).unwrap();
     writer.add(0, &color, Some(&depth)).unwrap();
     writer.add(1, &color, Some(&depth)).unwrap();
     // While it is being written, no other run may write it.
-    let overwrite = WriterOptions { overwrite: true, ..WriterOptions::default() };
-    assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["is being written by another run"]);
+    assert_says(RecordingWriter::create(dir.path(), true).map(drop), &["is being written by another run"]);
     writer.finish().unwrap();
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["exists already"]);
+    assert_says(RecordingWriter::create(dir.path(), false).map(drop), &["exists already"]);
     // Pictures without lists count as a recording, too.
     for list in ["rgb.txt", "depth.txt"] {
         fs::remove_file(dir.path().join(list)).unwrap();
     }
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["exists already"]);
+    assert_says(RecordingWriter::create(dir.path(), false).map(drop), &["exists already"]);
 
     fs::write(dir.path().join("notes.txt"), "kept").unwrap();
-    assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["notes.txt was not written by"]);
+    assert_says(RecordingWriter::create(dir.path(), true).map(drop), &["notes.txt was not written by"]);
     fs::remove_file(dir.path().join("notes.txt")).unwrap();
-    let mut writer = Writer::create(dir.path(), &overwrite).unwrap();
+    let mut writer = RecordingWriter::create(dir.path(), true).unwrap();
     let other = frame(9).0;
     writer.add(7, &other, None).unwrap();
     assert!(dir.path().join("rgb/000001.png").exists(), "what was there stays until the new is whole");
@@ -130,7 +127,7 @@ fn an_existing_recording_is_kept_unless_asked() {
 fn a_frame_that_does_not_fit_is_refused_and_the_rest_stays() {
     let dir = TempDir::new().unwrap();
     let (color, depth) = frame(0);
-    let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
+    let mut writer = RecordingWriter::create(dir.path(), false).unwrap();
     writer.add(10, &color, Some(&depth)).unwrap();
     assert_says(writer.add(10, &color, Some(&depth)), &["frame 1", "not after"]);
     assert_says(writer.add(9, &color, None), &["frame 1", "not after"]);
@@ -150,12 +147,10 @@ fn a_frame_that_does_not_fit_is_refused_and_the_rest_stays() {
 #[test]
 fn nothing_recorded_is_an_error_and_leaves_the_folder_free() {
     let dir = TempDir::new().unwrap();
-    let writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
+    let writer = RecordingWriter::create(dir.path(), false).unwrap();
     assert_says(writer.finish(), &["nothing was recorded"]);
-    assert!(Writer::create(dir.path(), &WriterOptions::default()).is_ok());
-    let options = WriterOptions { depth_scale: 0.0, overwrite: true };
-    assert_says(Writer::create(dir.path(), &options).map(drop), &["depth scale"]);
+    assert!(RecordingWriter::create(dir.path(), false).is_ok());
     fs::write(dir.path().join("file"), "").unwrap();
     let inside_a_file = dir.path().join("file/recording");
-    assert_says(Writer::create(&inside_a_file, &WriterOptions::default()).map(drop), &["file", "it is not a folder"]);
+    assert_says(RecordingWriter::create(&inside_a_file, false).map(drop), &["file", "it is not a folder"]);
 }

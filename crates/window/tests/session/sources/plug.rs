@@ -14,7 +14,7 @@ use bokehcam_live::sink::{self, Sink};
 use bokehcam_live::source::devices::Choice;
 use bokehcam_live::source::modes::Mode;
 use bokehcam_live::source::{self, Frames, Options};
-use bokehcam_media::recording::tum::{Writer, WriterOptions};
+use bokehcam_media::recording::RecordingWriter;
 use bokehcam_window::services::{CliOption, OpenedSource, Services, SettingsStore};
 use bokehcam_window::state::{Camera, DepthMethod};
 use bokehcam_window::system::System;
@@ -26,7 +26,7 @@ pub const FRAMES: usize = 12;
 
 /// Records frames of brightness 20 times their index, and of depth 2 m plus 0.1 m per frame.
 pub fn record(dir: &Path) {
-    let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
+    let mut writer = RecordingWriter::create(dir, false).unwrap();
     for frame in 0..FRAMES {
         let (mut color, mut depth) = (ColorImage::new(48, 32), DepthMap::new(48, 32));
         color.rgb.fill(20 * frame as u8);
