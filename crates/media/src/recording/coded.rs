@@ -1,6 +1,7 @@
 //! Encoded picture files: detected by their first bytes, limited by their header, and decoded row by row.
 //!
-//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`](super::MAX_SIDE_PX) columns and rows, and [`MAX_PIXELS`].
+//! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`](super::MAX_SIDE_PX) columns and rows, and
+//! [`MAX_PIXELS`](super::MAX_PIXELS) pixels.
 //! Besides the pixels, a PNG needs one row; a JPEG needs three times the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per
 //! pixel; other files need what `decoders` allows.
 
@@ -12,7 +13,6 @@ use image::codecs::{gif::GifDecoder, webp::WebPDecoder};
 use image::metadata::Orientation;
 use image::{AnimationDecoder, ColorType, ImageDecoder, ImageFormat};
 
-use super::MAX_PIXELS;
 use super::color_space;
 use super::decoders::{
     PICTURES, check_size, create_decoder, create_jpeg_decoder, create_png_decoder, decode_with, guard, sample_format,
@@ -26,11 +26,8 @@ use super::pixel_runs::{PixelRun, png_pixel_runs};
 use super::samples::SampleFormat;
 use bokehcam_files::input;
 
-/// Far more than a photograph of [`MAX_PIXELS`] needs.
+/// Far more than a photograph of `MAX_PIXELS` needs.
 const MAX_JPEG_BYTES: u64 = 192 << 20;
-
-/// Largest float map accepted: 4 bytes per pixel, and room for a header.
-const MAX_PFM_BYTES: u64 = 4 * MAX_PIXELS + 4096;
 
 /// Part of a JPEG that has its EXIF: a segment of 64 KiB, after those of JFIF and other small ones.
 const MAX_EXIF_START_BYTES: u64 = 256 << 10;
@@ -209,14 +206,6 @@ pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), Pic
     Ok((size, samples))
 }
 
-/// Reads the content of a PFM file.
-pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
-    match open_detected(path)? {
-        (file, Some(FileKind::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
-        _ => Err(PictureFault::Format("grey PFM")),
-    }
-}
-
 /// Reads the header of a PNG and the metadata before its pixels.
 pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
     let (file, kind) = open_detected(path)?;
@@ -298,12 +287,14 @@ fn open_detected(path: &Path) -> Result<(File, Option<FileKind>), PictureFault> 
     }
 }
 
-fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
+/// Reads a whole file, which has at most `max_bytes`.
+pub(super) fn read_from_start(mut file: File, max_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
     let bytes = file.metadata()?.len();
     if bytes > max_bytes {
         return Err(PictureFault::FileSize { bytes, max_bytes });
     }
     memory.clear();
+    memory.reserve(bytes as usize);
     file.rewind()?;
     file.take(max_bytes).read_to_end(memory)?;
     Ok(memory)

@@ -4,7 +4,6 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use super::coded::EncodedPicture;
 use super::decode::{self, DepthUnits, Scratch};
@@ -12,6 +11,7 @@ use super::decoders::check_size;
 use super::error::RecordingError;
 use super::fault::{LineFault, PictureFault, ReadResult};
 use super::raw_image::{self, RawImage};
+use super::slow_search::SlowSearch;
 use super::{DepthUnit, Options, StereoGeometry, Unpaired};
 use bokehcam::calibration::registration::RgbdCalibration;
 use bokehcam::frame::{ColorImage, DepthMap};
@@ -89,7 +89,7 @@ pub(super) trait Container: Debug + Send + Sync {
         match self.read_stored_color(frame, &mut scratch.file)? {
             StoredColor::Encoded(data) => {
                 let coded = EncodedPicture::open_bytes(data)?;
-                decode::decode_color_of_size(coded, expected, &mut scratch.pixels, into).map(drop)
+                decode::decode_color(coded, Some(expected), &mut scratch.pixels, into).map(drop)
             }
             StoredColor::Raw(image) => {
                 decode::check_color_size(image.size, expected)?;
@@ -202,28 +202,22 @@ impl RecordingFolder {
 
 /// Number of folders that a [`Locator`] caches.
 const MAX_FOLDERS: usize = 64;
-/// A search that takes longer is reported.
-const SLOW_LOOKUP: Duration = Duration::from_secs(2);
 
 /// Locates the pictures of long lists: caches resolved folders, and warns if it takes long.
 pub(super) struct Locator<'a> {
     folder: &'a RecordingFolder,
     resolved: HashMap<PathBuf, PathBuf>,
-    began: Instant,
-    has_warned: bool,
+    search: SlowSearch,
 }
 
 impl<'a> Locator<'a> {
     pub(super) fn new(folder: &'a RecordingFolder) -> Self {
-        Self { folder, resolved: HashMap::new(), began: Instant::now(), has_warned: false }
+        Self { folder, resolved: HashMap::new(), search: SlowSearch::begin() }
     }
 
     /// Same as [`RecordingFolder::locate`].
     pub(super) fn locate(&mut self, source: &PictureSource) -> Result<PathBuf, RecordingError> {
-        if !self.has_warned && self.began.elapsed() > SLOW_LOOKUP {
-            self.has_warned = true;
-            tracing::warn!("{}: searching the pictures for a readable one; this takes long", self.folder.dir.display());
-        }
+        self.search.warn_if_slow(self.folder.dir.display(), "searching the pictures for a readable one");
         let path = self.folder.root.join(source.file(&self.folder.dir)?);
         let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return self.folder.locate(source) };
         if self.resolved.len() > MAX_FOLDERS {

@@ -19,7 +19,7 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 /// Working memory for decoding, kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// The content of a file that must be read completely: a JPEG or PFM, or a part of a recording's file.
+    /// The content of a file that must be read completely: a JPEG, or a part of a recording's file.
     pub(super) file: Vec<u8>,
     /// One row of a PNG, or all pixels of a JPEG.
     pub(super) pixels: Vec<u8>,
@@ -28,13 +28,6 @@ pub struct Scratch {
     /// Depth in the view of the depth camera, and in that of a colour camera without distortion.
     pub(super) measured: DepthMap,
     pub(super) drawn: DepthMap,
-}
-
-impl Scratch {
-    /// Reads the float map `path`.
-    pub(super) fn read_pfm(&mut self, path: &Path) -> Result<&[u8], PictureFault> {
-        coded::read_pfm(path, &mut self.file)
-    }
 }
 
 /// The encoding of depth in 16-bit pictures.
@@ -66,19 +59,14 @@ pub(super) fn read_header(path: &Path) -> Result<((u32, u32), PictureKind), Pict
 }
 
 /// Decodes to 8-bit RGB as it is shown, in sRGB: grey is repeated, what is transparent is in front of white, 16 bits are
-/// rounded to 8. With `expected`, a picture
-/// of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
+/// rounded to 8. With `expected`, a picture of another size is rejected before it is decoded. Returns colour profile, EXIF, and what was lost.
 pub(super) fn read_color(
     path: &Path,
     expected: Option<(u32, u32)>,
     scratch: &mut Scratch,
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
-    let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    match expected {
-        Some(expected) => decode_color_of_size(coded, expected, &mut scratch.pixels, into),
-        None => decode_color(coded, &mut scratch.pixels, into),
-    }
+    decode_color(EncodedPicture::open(path, &mut scratch.file)?, expected, &mut scratch.pixels, into)
 }
 
 /// Decodes as [`read_color`] does, and turns the picture upright by its orientation tag, which is then upright.
@@ -89,17 +77,6 @@ pub(super) fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), Pic
 
     let orientation = metadata.take_orientation();
     Ok((upright(orientation).transform_color(image), metadata))
-}
-
-/// Decodes as [`decode_color`] does, but rejects a picture whose size is not `expected` before.
-pub(super) fn decode_color_of_size(
-    coded: EncodedPicture,
-    expected: (u32, u32),
-    pixels: &mut Vec<u8>,
-    into: &mut ColorImage,
-) -> Result<PhotoMetadata, PictureFault> {
-    check_color_size(coded.size(), expected)?;
-    decode_color(coded, pixels, into)
 }
 
 /// Rejects a picture of another size than `expected`.
@@ -148,9 +125,11 @@ pub(super) fn read_upright(
 /// Decodes an opened picture as [`read_color`] does. `pixels` is working memory.
 pub(super) fn decode_color(
     coded: EncodedPicture,
+    expected: Option<(u32, u32)>,
     pixels: &mut Vec<u8>,
     into: &mut ColorImage,
 ) -> Result<PhotoMetadata, PictureFault> {
+    expected.map_or(Ok(()), |expected| check_color_size(coded.size(), expected))?;
     let mut metadata = decode_stored_color(coded, pixels, into)?;
     // The profile no longer applies to what it has converted.
     metadata.icc_profile.take_if(|profile| color_space::convert_to_srgb(profile, &mut into.rgb));
@@ -172,10 +151,7 @@ pub(super) fn decode_stored_color(
     let mut metadata = coded.decode_runs(pixels, |run, row| {
         let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
         for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            let sample = |channel: usize| match samples.is_16bit {
-                true => round_to_8bit(sample_u16(pixel, channel)),
-                false => pixel[channel],
-            };
+            let sample = |channel: usize| round_to_8bit(samples.code_16bit(pixel, channel));
             *rgb = channels.map(sample);
             if samples.has_alpha() {
                 let alpha = sample(samples.channels - 1);
@@ -186,11 +162,6 @@ pub(super) fn decode_stored_color(
     let lost = [(samples.has_alpha(), TRANSPARENCY), (samples.is_16bit, SIXTEEN_BITS)];
     metadata.lost_properties.extend(lost.iter().filter(|(is_lost, _)| *is_lost).map(|(_, words)| words));
     Ok(metadata)
-}
-
-/// Returns the 16-bit sample of a channel.
-pub(super) fn sample_u16(pixel: &[u8], channel: usize) -> u16 {
-    u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])
 }
 
 /// Decodes a right picture to luma, from RGB as for the left one. A picture whose size differs from `left` is rejected

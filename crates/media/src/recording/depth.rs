@@ -1,17 +1,19 @@
 //! The depth of a recording, in the view of its colour camera.
 
 use std::mem;
+use std::path::Path;
 
 use image::metadata::Orientation;
 
 use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
 use super::error::{RecordingError, Result};
-use super::fault::PictureFault;
+use super::fault::{PictureFault, ReadResult};
 use super::upright::upright;
-use super::{Recording, coded, luma, pfm};
+use super::{Recording, coded, depth_file, luma};
 use bokehcam::calibration::registration::{Registration, RgbdCalibration};
 use bokehcam::frame::DepthMap;
+use bokehcam::optics::StereoRig;
 
 impl Recording {
     /// Returns whether the frames have depth.
@@ -111,7 +113,7 @@ impl Recording {
                     DepthFormat::Inverse { white_is_far } => {
                         luma::read_inverse_depth(&path, *white_is_far, stored_size, scratch, into)
                     }
-                    DepthFormat::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, stored_size, scratch, into),
+                    DepthFormat::Disparity(rig) => read_disparity(&path, rig, stored_size).map(|map| *into = map),
                 };
                 if !turn.is_identity() {
                     *into = turn.transform_map(mem::take(into), stored_size);
@@ -130,4 +132,13 @@ impl Recording {
         };
         checked.map_err(|fault| source.error(&self.folder.dir, fault))
     }
+}
+
+/// Reads disparities, in pixels of the map, as depth. The rig is for the colour picture of `color` pixels, whose view the map
+/// must cover.
+fn read_disparity(path: &Path, rig: &StereoRig, color: (u32, u32)) -> ReadResult<DepthMap> {
+    let map = depth_file::read_disparity(path)?;
+    decode::check_depth_size(map.size(), color)?;
+    let zoom = color.0 as f32 / map.width as f32;
+    Ok(map.to_depth_map(|px| rig.depth_m(px * zoom)))
 }

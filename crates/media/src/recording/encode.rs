@@ -8,10 +8,10 @@ use png::chunk::ChunkType;
 use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
-use super::unit::{self, DISPARITY_SCALE, MapUnit};
+use super::unit::{self, MapUnit};
 use super::{image_resources, jpeg, jpeg_intervals, xmp};
 use bokehcam::color::round_to_8bit;
-use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
+use bokehcam::frame::{ColorImage, DepthMap};
 
 /// High enough that compression artefacts stay invisible.
 const JPEG_QUALITY: u8 = 95;
@@ -143,30 +143,9 @@ pub(super) fn encode_photo_webp(
     encoder.encode(&raster.to_8bit().0, raster.size.0, raster.size.1, color)
 }
 
-/// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre, with `meaning` as a text chunk if
-/// given; `units` is working memory.
-pub(super) fn encode_depth_png(
-    depth: &DepthMap,
-    depth_scale: f32,
-    map_unit: Option<MapUnit>,
-    units: &mut Vec<u8>,
-    file: &mut Vec<u8>,
-) -> Result<(), png::EncodingError> {
-    encode_png_16bit(depth.size(), &depth.metres, depth_scale, map_unit, units, file)
-}
-
-/// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel, with `meaning` as a text
-/// chunk.
-pub(super) fn encode_disparity_png(
-    disparity: &DisparityMap,
-    map_unit: MapUnit,
-    file: &mut Vec<u8>,
-) -> Result<(), png::EncodingError> {
-    encode_png_16bit(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(map_unit), &mut Vec::new(), file)
-}
-
-/// Appends `values` (`height` x `width`, row-major) to `file` as 16-bit grey PNG of `scale` units per 1.0, 0 = unknown.
-fn encode_png_16bit(
+/// Appends `values` (`height` x `width`, row-major) to `file` as 16-bit grey PNG of `scale` units per 1.0, 0 = unknown,
+/// which states what they are if `map_unit` does; `units` is working memory.
+pub(super) fn encode_png_16bit(
     (width, height): (u32, u32),
     values: &[f32],
     scale: f32,

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::coded::EncodedPicture;
-use super::decode::{Scratch, check_depth_size, sample_u16};
+use super::decode::{Scratch, check_depth_size};
 use super::fault::PictureFault;
 use super::photo_metadata::PhotoMetadata;
+use super::samples::GREY_TOLERANCE;
 use bokehcam::color::luminance;
 use bokehcam::frame::DepthMap;
 
@@ -59,15 +60,11 @@ pub(super) fn decode_luma(
     pixels: &mut Vec<u8>,
     mut on_pixel: impl FnMut(usize, LumaPixel),
 ) -> Result<PhotoMetadata, PictureFault> {
-    const TOLERANCE: f32 = 8.0 / 255.0;
     let samples = coded.samples();
     coded.decode_runs(pixels, |run, row| {
         let places = (run.first..).step_by(run.step);
         for (at, pixel) in places.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            let sample = |channel: usize| match samples.is_16bit {
-                true => f32::from(sample_u16(pixel, channel)) / 65535.0,
-                false => f32::from(pixel[channel]) / 255.0,
-            };
+            let sample = |channel: usize| f32::from(samples.code(pixel, channel)) / samples.white();
             let (luma, chroma) = match samples.has_color() {
                 true => {
                     let [red, green, blue] = [sample(0), sample(1), sample(2)];
@@ -76,7 +73,7 @@ pub(super) fn decode_luma(
                 false => (sample(0), 0.0),
             };
             let alpha = if samples.has_alpha() { sample(samples.channels - 1) } else { 1.0 };
-            on_pixel(at, LumaPixel { luma, alpha, is_colored: chroma > TOLERANCE });
+            on_pixel(at, LumaPixel { luma, alpha, is_colored: chroma > GREY_TOLERANCE });
         }
     })
 }

@@ -12,6 +12,7 @@ use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::FileKind;
 use super::luma::{self, LumaPixel};
+use super::samples::GREY_TOLERANCE;
 use super::upright::upright;
 use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
@@ -19,8 +20,6 @@ use bokehcam::frame::Mask;
 /// Suffixes of the masks of pictures, after the picture's stem.
 const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
 
-/// Change of a value that lossy compression makes.
-const TOLERANCE: f32 = 8.0 / 255.0;
 /// Largest code of a mask that numbers objects: far darker than any coverage that is meant.
 const MAX_LABEL: f32 = 31.0;
 /// Share of the pixels whose colours may differ from a mask.
@@ -86,7 +85,7 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
     let mut alphas = if samples.has_alpha() { vec![1.0; pixels] } else { Vec::new() };
     let (mut lowest, mut highest, mut brightest) = (1.0_f32, 0.0_f32, 0.0_f32);
     let (mut unequal, mut colored) = (0, 0);
-    let white = if samples.is_16bit { 65535.0 } else { 255.0 };
+    let white = samples.white();
     let is_jpeg = coded::read_kind(path) == Some(FileKind::Jpeg);
     let mut metadata = luma::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
         let LumaPixel { luma, alpha, is_colored } = pixel;
@@ -95,12 +94,12 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
             *place = alpha;
         }
         (lowest, highest, brightest) = (lowest.min(alpha), highest.max(alpha), brightest.max(luma));
-        unequal += usize::from(alpha - luma * alpha > TOLERANCE);
+        unequal += usize::from(alpha - luma * alpha > GREY_TOLERANCE);
         colored += usize::from(is_colored && alpha > 0.0);
     })?;
     let is_many = |count: usize| count as f32 > MAX_SHARE * pixels as f32;
     let reading = match () {
-        () if highest - lowest > TOLERANCE => Reading::Alpha,
+        () if highest - lowest > GREY_TOLERANCE => Reading::Alpha,
         () if background.is_some() && colored > 0 => Reading::Labels,
         // Compression makes such codes of black.
         () if !is_jpeg && (0.5..=MAX_LABEL).contains(&(brightest * white)) => Reading::Labels,

@@ -1,7 +1,7 @@
 //! Recordings on disk, read and written frame by frame, and single pictures ([`still`], [`snapshot`]).
 //!
-//! A [`Recording`] is opened by its folder; the content decides its layout. [`tum`] can be read and written; `kitti`,
-//! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists; [`mcap`]
+//! A [`Recording`] is opened by its folder; the content decides its layout. `tum` can be read and written; `kitti`,
+//! `euroc` and `middlebury` can be read, and are stereo; `rgbd` and [`pictures`] are folders without lists; `mcap`
 //! (which can be written), `record3d` and `kinect` are single files.
 
 pub mod depth_file;
@@ -9,10 +9,10 @@ pub mod depth_file;
 pub mod embedded;
 pub mod geometry;
 pub mod mask_file;
-pub mod mcap;
+mod mcap;
 pub mod snapshot;
 pub mod still;
-pub mod tum;
+mod tum;
 
 mod calib;
 mod coded;
@@ -51,6 +51,7 @@ mod record3d;
 mod rgbd;
 mod role;
 mod samples;
+mod slow_search;
 mod strict_jpeg;
 mod tiff_directory;
 mod tiff_file;
@@ -69,6 +70,7 @@ pub use decode::Scratch;
 pub use depth_file::{DepthUnit, covers as depth_covers};
 pub use error::RecordingError;
 pub use fault::{GeometryFault, LineFault, PictureFault};
+pub use frame_sequence::RecordingSummary;
 pub use options::Options;
 use options::check_depth_scale;
 pub use photo::Photo;
@@ -112,6 +114,13 @@ pub struct Unpaired {
     pub depth: usize,
     /// Pictures of the right camera.
     pub right: usize,
+}
+
+impl Unpaired {
+    /// Returns the counts where `frames` pairs were made of these counts of pictures and depth maps; zeros without depth.
+    fn beside(frames: usize, color: usize, depth: Option<usize>) -> Self {
+        depth.map_or(Self::default(), |depth| Self { color: color - frames, depth: depth - frames, right: 0 })
+    }
 }
 
 /// The stereo geometry of a recording.

@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use super::contents::PictureSource;
 use super::list::Entry;
+use super::timeline;
 
 /// The list of a time, and its index there.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,6 +46,15 @@ pub(super) fn pair_by_time(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns
         }
     }
     paired
+}
+
+/// Pairs pictures with the depth maps that were taken within half a frame. Returns the positions of both in their strictly
+/// increasing lists of times; without depth, all pictures.
+pub(super) fn pair_frames(color_ns: &[u64], depth_ns: Option<&[u64]>) -> Vec<(usize, Option<usize>)> {
+    let Some(depth_ns) = depth_ns else { return (0..color_ns.len()).map(|color| (color, None)).collect() };
+    let tolerance_ns = timeline::median_period_ns(color_ns.iter().copied()) / 2;
+    let partners = pair_nearest(color_ns, depth_ns, tolerance_ns).into_iter().enumerate();
+    partners.filter_map(|(color, depth)| Some((color, Some(depth?)))).collect()
 }
 
 /// Pairs two strictly increasing lists of times greedily, the closest pair first, each time at most once, as the TUM

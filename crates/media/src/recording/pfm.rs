@@ -1,42 +1,10 @@
 //! The portable float map (PFM): one float per pixel, bottom row first, common for disparity and depth.
 
 use std::io::Write;
-use std::path::Path;
 
-use super::decode::Scratch;
 use super::decoders::check_size;
-use super::depth_covers;
 use super::fault::PictureFault;
 use super::unit::MapUnit;
-use bokehcam::frame::DepthMap;
-use bokehcam::optics::StereoRig;
-
-/// Returns whether the file name has the extension `.pfm`.
-pub(super) fn is_pfm_path(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
-}
-
-/// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` (columns, rows) pixels,
-/// whose view the disparity map must cover.
-pub(super) fn read_disparity_as_depth(
-    path: &Path,
-    rig: &StereoRig,
-    color: (u32, u32),
-    scratch: &mut Scratch,
-    into: &mut DepthMap,
-) -> Result<(), PictureFault> {
-    let (found, _) = parse(scratch.read_pfm(path)?, &mut into.metres)?;
-    if !depth_covers(found, color) {
-        return Err(PictureFault::DepthSize { found, color });
-    }
-    (into.width, into.height) = found;
-    // Disparities are in pixels of the map, the rig in pixels of the colour picture.
-    let zoom = color.0 as f32 / found.0 as f32;
-    for value in &mut into.metres {
-        *value = if DepthMap::is_known(*value) { rig.depth_m(*value * zoom) } else { 0.0 };
-    }
-    Ok(())
-}
 
 /// Parses a PFM into `values` as stored, top row first. Returns width and height, and the meaning if the file states it.
 /// Colours are accepted if they are grey.
@@ -96,7 +64,7 @@ fn parse_number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
 }
 
 /// Appends `values` (`height` x `width`, row-major) to `file` as a little-endian PFM that states their `meaning`.
-pub(super) fn encode_pfm(width: u32, height: u32, values: &[f32], map_unit: MapUnit, file: &mut Vec<u8>) {
+pub(super) fn encode_pfm((width, height): (u32, u32), values: &[f32], map_unit: MapUnit, file: &mut Vec<u8>) {
     // Writing to memory cannot fail.
     let _ = write!(file, "Pf\n{width} {height}\n{}\n", map_unit.pfm_scale());
     for row in values.chunks_exact(width.max(1) as usize).rev() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::coded::{self, EncodedPicture};
-use super::decode::{self, sample_u16};
+use super::decode;
 use super::encode::Raster;
 use super::fault::PictureFault;
 use super::photo_metadata::{SIXTEEN_BITS, TRANSPARENCY};
@@ -69,21 +69,18 @@ impl Photo {
         let mut codes = has_codes.then(|| Picture16::new(size, curves));
         let mut alpha = samples.has_alpha().then(|| vec![0; photo.color.rgb.len() / 3]);
         let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-        let sample = |pixel: &[u8], channel: usize| match is_16bit {
-            true => sample_u16(pixel, channel),
-            false => u16::from(pixel[channel]) * 257,
-        };
         photo.metadata = coded.decode_runs(&mut Vec::new(), |run, row| {
             let pixels = row.chunks_exact(samples.bytes_per_pixel()).enumerate();
             for (at, pixel) in pixels.map(|(k, pixel)| (run.first + k * run.step, pixel)) {
                 match &mut codes {
                     Some(codes) => {
-                        codes.rgb.as_chunks_mut::<3>().0[at] = channels.map(|channel| sample(pixel, channel))
+                        codes.rgb.as_chunks_mut::<3>().0[at] =
+                            channels.map(|channel| samples.code_16bit(pixel, channel))
                     }
                     None => photo.color.rgb.as_chunks_mut::<3>().0[at] = channels.map(|channel| pixel[channel]),
                 }
                 if let Some(alpha) = &mut alpha {
-                    alpha[at] = sample(pixel, samples.channels - 1);
+                    alpha[at] = samples.code_16bit(pixel, samples.channels - 1);
                 }
             }
         })?;

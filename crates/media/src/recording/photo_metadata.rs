@@ -152,18 +152,15 @@ impl PhotoMetadata {
     /// Drops metadata that is too large for a JPEG.
     #[must_use]
     pub fn for_jpeg(mut self) -> Self {
-        if self.exif.as_ref().is_some_and(|exif| exif.len() > MAX_JPEG_EXIF_BYTES) {
-            self.exif = None;
-            self.lost_properties.push("EXIF larger than a JPEG holds");
+        fn limit(part: &mut Option<impl AsRef<[u8]>>, max_bytes: usize, lost: &'static str) -> Option<&'static str> {
+            part.take_if(|part| part.as_ref().len() > max_bytes).map(|_| lost)
         }
-        if self.icc_profile.as_ref().is_some_and(|profile| profile.len() > MAX_JPEG_ICC_BYTES) {
-            self.icc_profile = None;
-            self.lost_properties.push("a colour profile larger than a JPEG holds");
-        }
-        if self.xmp.as_ref().is_some_and(|packet| packet.len() > xmp::MAX_JPEG_BYTES) {
-            self.xmp = None;
-            self.lost_properties.push("XMP larger than a JPEG holds");
-        }
+        let lost = [
+            limit(&mut self.exif, MAX_JPEG_EXIF_BYTES, "EXIF larger than a JPEG holds"),
+            limit(&mut self.icc_profile, MAX_JPEG_ICC_BYTES, "a colour profile larger than a JPEG holds"),
+            limit(&mut self.xmp, xmp::MAX_JPEG_BYTES, "XMP larger than a JPEG holds"),
+        ];
+        self.lost_properties.extend(lost.into_iter().flatten());
         self
     }
 }

@@ -14,50 +14,30 @@ pub(super) enum Role {
     Other,
 }
 
-const OTHER: [&str; 20] = [
-    "normal",
-    "normals",
-    "position",
-    "positions",
-    "motion",
-    "velocity",
-    "vector",
-    "flow",
-    "mist",
-    "conf",
-    "confidence",
-    "certainty",
-    "uncertainty",
-    "variance",
-    "valid",
-    "validity",
-    "mask",
-    "masks",
-    "label",
-    "labels",
-];
-const DISPARITY: [&str; 3] = ["disp", "disparity", "disparities"];
-const INVERSE: [&str; 4] = ["inv", "inverse", "invdepth", "idepth"];
-const DEPTH: [&str; 7] = ["depth", "depths", "depthmap", "zdepth", "z", "distance", "distances"];
+const OTHER: &str = "normal normals position positions motion velocity vector flow mist conf confidence certainty \
+    uncertainty variance valid validity mask masks label labels";
+const DISPARITY: &str = "disp disparity disparities";
+const INVERSE: &str = "inv inverse invdepth idepth";
+const DEPTH: &str = "depth depths depthmap zdepth z distance distances";
 
 impl Role {
     /// Returns the role that a name states, such as `ViewLayer.Denoising Depth` or `left_disp0`.
     pub fn of_name(name: &str) -> Self {
         let words: Vec<String> = words(name).collect();
-        let has = |known: &[&str]| words.iter().any(|word| known.contains(&&**word));
+        let has = |known: &str| known.split(' ').any(|known| words.iter().any(|word| word == known));
         // The confidence, mask or normal of depth is no depth.
         match () {
-            () if has(&OTHER) => Self::Other,
-            () if has(&DISPARITY) => Self::Disparity,
-            () if has(&INVERSE) => Self::InverseDepth,
-            () if has(&DEPTH) => Self::Depth,
+            () if has(OTHER) => Self::Other,
+            () if has(DISPARITY) => Self::Disparity,
+            () if has(INVERSE) => Self::InverseDepth,
+            () if has(DEPTH) => Self::Depth,
             () => Self::Unstated,
         }
     }
 
     /// Returns the number of words of a name beside those that state its role: the fewer, the plainer.
     pub fn count_other_words(name: &str) -> usize {
-        words(name).filter(|word| !DEPTH.contains(&&**word)).count()
+        words(name).filter(|word| DEPTH.split(' ').all(|known| word != known)).count()
     }
 }
 

@@ -15,8 +15,8 @@ use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
 pub use super::photo_metadata::PhotoFormat;
 use super::photo_metadata::PhotoMetadata;
-use super::unit::MapUnit;
-use super::{check_depth_scale, coded, decode, depth_covers, encode, luma, pfm, tiff_file};
+use super::unit::{DISPARITY_SCALE, MapUnit};
+use super::{check_depth_scale, coded, decode, encode, luma, pfm, tiff_file};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use bokehcam_files::atomic_file;
@@ -51,10 +51,7 @@ pub fn read_size(path: &Path) -> Result<(u32, u32)> {
 /// # Errors
 /// The map is larger, or of another aspect ratio.
 pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<()> {
-    match depth_covers(depth, color) {
-        true => Ok(()),
-        false => Err(RecordingError::picture(path)(PictureFault::DepthSize { found: depth, color })),
-    }
+    decode::check_depth_size(depth, color).map_err(RecordingError::picture(path))
 }
 
 /// Reads a depth map in metres in its own size, in a format of [`depth_file::read`]. `depth_scale` is for whole numbers,
@@ -177,15 +174,7 @@ pub fn is_gif(path: &Path) -> bool {
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<()> {
     check_depth_scale(depth_scale)?;
     let map_unit = MapUnit::Depth { per_m: depth_scale };
-    let mut file = Vec::new();
-    let encoded = match map_format(path)? {
-        MapFormat::Pfm => {
-            pfm::encode_pfm(depth.width, depth.height, &depth.metres, map_unit, &mut file);
-            Ok(())
-        }
-        MapFormat::Png => encode::encode_depth_png(depth, depth_scale, Some(map_unit), &mut Vec::new(), &mut file),
-    };
-    write(path, encoded, &file, force)
+    write_map(path, depth.size(), &depth.metres, depth_scale, map_unit, force)
 }
 
 /// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown, as is disparity beyond 65535 units (KITTI);
@@ -195,16 +184,20 @@ pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool)
 /// # Errors
 /// Same as for [`write_color`].
 pub fn write_disparity(path: &Path, disparity: &DisparityMap, rig: Option<StereoRig>, force: bool) -> Result<()> {
-    let map_unit = MapUnit::Disparity { rig };
+    let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
+    let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
+    write_map(path, disparity.size(), &px, DISPARITY_SCALE, MapUnit::Disparity { rig }, force)
+}
+
+/// Writes numbers, of which a PNG has `scale` units per 1.0.
+fn write_map(path: &Path, size: (u32, u32), numbers: &[f32], scale: f32, map_unit: MapUnit, force: bool) -> Result<()> {
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
-            let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
-            let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
-            pfm::encode_pfm(disparity.width, disparity.height, &px, map_unit, &mut file);
+            pfm::encode_pfm(size, numbers, map_unit, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::encode_disparity_png(disparity, map_unit, &mut file),
+        MapFormat::Png => encode::encode_png_16bit(size, numbers, scale, Some(map_unit), &mut Vec::new(), &mut file),
     };
     write(path, encoded, &file, force)
 }
@@ -223,12 +216,10 @@ pub enum MapFormat {
 /// # Errors
 /// The extension is not `.png` or `.pfm`.
 pub fn map_format(path: &Path) -> Result<MapFormat> {
-    if pfm::is_pfm_path(path) {
-        Ok(MapFormat::Pfm)
-    } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
-        Ok(MapFormat::Png)
-    } else {
-        Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.pfm`")))
+    match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
+        Some("pfm") => Ok(MapFormat::Pfm),
+        Some("png") => Ok(MapFormat::Png),
+        _ => Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.pfm`"))),
     }
 }
 

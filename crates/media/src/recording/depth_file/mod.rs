@@ -24,7 +24,7 @@ pub use unit::DepthUnit;
 #[doc(hidden)]
 pub use values::has_colors;
 
-use super::coded::EncodedPicture;
+use super::coded::{self, EncodedPicture};
 use super::decoders::guard;
 use super::fault::{PictureFault, open_fault};
 use super::{MAX_PIXELS, RecordingError, pfm};
@@ -158,12 +158,8 @@ fn read_numbers(path: &Path) -> Result<Values, PictureFault> {
 }
 
 fn read_whole(file: File) -> Result<Vec<u8>, PictureFault> {
-    let bytes = file.metadata()?.len();
-    if bytes > MAX_FLOATS_BYTES {
-        return Err(PictureFault::FileSize { bytes, max_bytes: MAX_FLOATS_BYTES });
-    }
-    let mut content = Vec::with_capacity(bytes as usize);
-    file.take(MAX_FLOATS_BYTES).read_to_end(&mut content)?;
+    let mut content = Vec::new();
+    coded::read_from_start(file, MAX_FLOATS_BYTES, &mut content)?;
     Ok(content)
 }
 

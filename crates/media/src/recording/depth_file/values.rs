@@ -6,6 +6,7 @@ use crate::recording::coded::EncodedPicture;
 use crate::recording::fault::PictureFault;
 use crate::recording::photo_metadata::PhotoMetadata;
 use crate::recording::role::Role;
+use crate::recording::samples::GREY_TOLERANCE;
 use crate::recording::unit::{self, MapUnit};
 use crate::recording::upright::upright;
 
@@ -74,10 +75,7 @@ impl Values {
 pub(super) fn decode_codes(coded: EncodedPicture) -> Result<(Values, PhotoMetadata), PictureFault> {
     let ((width, height), format) = (coded.size(), coded.samples());
     let mut numbers = vec![0.0; width as usize * height as usize];
-    let sample = |pixel: &[u8], channel: usize| match format.is_16bit {
-        true => f32::from(u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])),
-        false => f32::from(pixel[channel]),
-    };
+    let sample = |pixel: &[u8], channel: usize| f32::from(format.code(pixel, channel));
     let samples = if format.is_16bit { Samples::Sixteen } else { Samples::Eight };
     let mut colors = ColorCount::new(samples.white());
     let metadata = coded.decode_runs(&mut Vec::new(), |run, row| {
@@ -105,13 +103,11 @@ pub(super) struct ColorCount {
 }
 
 impl ColorCount {
-    /// Tolerance of a channel, as a share of white: lossy compression changes grey by a few codes.
-    const TOLERANCE: f32 = 8.0 / 255.0;
     /// Share of coloured pixels above which a picture is not grey.
     const MAX_SHARE: f32 = 0.005;
 
     pub fn new(white: f32) -> Self {
-        Self { tolerance: Self::TOLERANCE * white, count: 0 }
+        Self { tolerance: GREY_TOLERANCE * white, count: 0 }
     }
 
     #[inline]

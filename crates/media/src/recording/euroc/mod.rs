@@ -15,38 +15,37 @@ use super::{Options, StereoGeometry, Unpaired, pair, timeline};
 pub(super) const LAYOUT: Layout = Layout {
     name: "EuRoC/ASL",
     expected_files: "mav0/cam0 with data.csv or data",
-    matches: |dir| CAMERAS.iter().any(|[left, _]| left.exists_in(dir)),
+    matches: |dir| find_cameras(dir).is_some(),
     open,
 };
 
-/// A camera's paths, relative to the folder of the recording.
-struct Camera {
-    list: &'static str,
-    pictures: &'static str,
-    sensor: &'static str,
+/// A camera's list, and the folder of its pictures.
+const LIST: &str = "data.csv";
+const PICTURES: &str = "data";
+
+/// The folder of a camera, relative to that of the recording.
+struct Camera(String);
+
+/// Returns the left and the right camera of a recording, whose folder is the parent of `mav0` or `mav0` itself.
+fn find_cameras(dir: &Path) -> Option<[Camera; 2]> {
+    let cameras = ["mav0/", ""].map(|parent| ["cam0", "cam1"].map(|camera| Camera(format!("{parent}{camera}"))));
+    cameras.into_iter().find(|[left, _]| left.exists_in(dir))
 }
 
-/// Left and right camera, first if the folder is the parent of `mav0`, then if it is `mav0` itself.
-const CAMERAS: [[Camera; 2]; 2] = [
-    [
-        Camera { list: "mav0/cam0/data.csv", pictures: "mav0/cam0/data", sensor: "mav0/cam0/sensor.yaml" },
-        Camera { list: "mav0/cam1/data.csv", pictures: "mav0/cam1/data", sensor: "mav0/cam1/sensor.yaml" },
-    ],
-    [
-        Camera { list: "cam0/data.csv", pictures: "cam0/data", sensor: "cam0/sensor.yaml" },
-        Camera { list: "cam1/data.csv", pictures: "cam1/data", sensor: "cam1/sensor.yaml" },
-    ],
-];
-
 impl Camera {
+    fn path(&self, name: &str) -> String {
+        format!("{}/{name}", self.0)
+    }
+
     fn exists_in(&self, dir: &Path) -> bool {
-        dir.join(self.list).exists() || dir.join(self.pictures).is_dir()
+        dir.join(self.path(LIST)).exists() || dir.join(self.path(PICTURES)).is_dir()
     }
 
     /// Reads the camera's pictures with their times, from its list or else from the file names.
     fn read(&self, dir: &Path, options: &Options) -> Result<Vec<Entry>, RecordingError> {
-        let mut entries = match dir.join(self.list).exists() {
-            true => list::read_list(dir, self.list, |position, text| {
+        let list = self.path(LIST);
+        let mut entries = match dir.join(&list).exists() {
+            true => list::read_list(dir, &list, |position, text| {
                 let columns = text.map(|text| text.split(',').map(str::trim).collect::<Vec<_>>());
                 match columns.as_deref() {
                     Ok(&[time, file]) => Entry::new(position, parse_ns(time), self.picture(file)),
@@ -68,26 +67,26 @@ impl Camera {
 
     /// Returns entries for the pictures whose names are times in nanoseconds; skips others.
     fn entries_by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
-        let names = find_numbered_pictures(&dir.join(self.pictures))?;
+        let names = find_numbered_pictures(&dir.join(self.path(PICTURES)))?;
         let entry = |name: String| {
             let time_ns = parse_ns(name.split('.').next()?).ok()?;
             Some(Entry {
                 time_ns: Some(time_ns),
-                source: PictureSource::from_path(Path::new(self.pictures).join(name)),
+                source: PictureSource::from_path(Path::new(&self.path(PICTURES)).join(name)),
             })
         };
         Ok(names.into_iter().filter_map(entry).collect())
     }
 
     fn picture(&self, file: &str) -> Result<PathBuf, LineFault> {
-        parse_relative_path(file).map(|file| Path::new(self.pictures).join(file))
+        parse_relative_path(file).map(|file| Path::new(&self.path(PICTURES)).join(file))
     }
 }
 
 /// Pairs the pictures of the two cameras by time, and reads their calibration. A left camera alone yields no pair.
 fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
-    let [left, right] = CAMERAS.iter().find(|[left, _]| left.exists_in(dir)).unwrap_or(&CAMERAS[0]);
+    let [left, right] = find_cameras(dir).ok_or_else(|| RecordingError::EmptyFolder { folder: dir.clone() })?;
     let frame = |left: Entry, right| ListedFrame { time_ns: left.time_ns, color: left.source, right, depth: None };
     let entries = left.read(dir, options)?;
     if !right.exists_in(dir) {
@@ -101,7 +100,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     if paired.frames.iter().all(|(_, right)| right.is_none()) {
         return Err(RecordingError::NoStereoPairs { dir: dir.clone(), tolerance_ns });
     }
-    let sensors = [left, right].map(|camera| dir.join(camera.sensor));
+    let sensors = [left, right].map(|camera| dir.join(camera.path("sensor.yaml")));
     let stereo_geometry = match sensors.iter().any(|sensor| sensor.exists()) {
         true => StereoGeometry::Raw(Box::new(bokehcam_calibration::euroc::read_sensors(&sensors[0], &sensors[1])?)),
         false => StereoGeometry::Uncalibrated,

@@ -14,7 +14,7 @@ use std::path::Path;
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, warn_of_damage};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
-use super::{Options, Unpaired, depth_covers, pair, timeline};
+use super::{Options, Unpaired, depth_covers, pair};
 use bokehcam::calibration::registration::RgbdCalibration;
 use bokehcam_files::input;
 use file::KinectFile;
@@ -99,11 +99,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         right: None,
         depth: depth.map(|_| source(DEPTH, at)),
     });
-    let unpaired = depth.map_or(Unpaired::default(), |depth| Unpaired {
-        color: colors.len() - frames.len(),
-        depth: depth.blocks.len() - frames.len(),
-        ..Unpaired::default()
-    });
+    let unpaired = Unpaired::beside(frames.len(), colors.len(), depth.map(|depth| depth.blocks.len()));
     let invalid = options.depth_invalid.filter(|&invalid| invalid != 0);
     let units = DepthUnits { scale: DEPTH_SCALE, invalid };
     Ok(Contents {
@@ -127,14 +123,10 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
 
 /// Returns the colour picture and the depth map of each frame: those that were taken within half a frame.
 fn pair_frames(found: &scan::Contents, colors: &[Block], depth: Option<&Track>) -> Vec<(Block, Option<Block>)> {
-    let Some(depth) = depth else { return colors.iter().map(|&color| (color, None)).collect() };
-    let depths = depth.in_order();
+    let depths = depth.map(Track::in_order);
     let times_ns = |blocks: &[Block]| blocks.iter().map(|block| found.time_ns(block.ticks)).collect::<Vec<_>>();
-    let colors_ns = times_ns(colors);
-    let tolerance_ns = timeline::median_period_ns(colors_ns.iter().copied()) / 2;
-    let partners = pair::pair_nearest(&colors_ns, &times_ns(&depths), tolerance_ns);
-    let pairs = colors.iter().zip(partners);
-    pairs.filter_map(|(&color, partner)| Some((color, Some(depths[partner?])))).collect()
+    let pairs = pair::pair_frames(&times_ns(colors), depths.as_deref().map(times_ns).as_deref()).into_iter();
+    pairs.map(|(color, depth)| (colors[color], depths.as_ref().zip(depth).map(|(depths, at)| depths[at]))).collect()
 }
 
 /// Reads the calibration.

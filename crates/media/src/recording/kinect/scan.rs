@@ -8,11 +8,11 @@
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
-use std::time::{Duration, Instant};
 
 use super::ebml::{self, Head};
 use super::track::{Block, Track};
 use crate::recording::MAX_ENTRIES;
+use crate::recording::slow_search::SlowSearch;
 use bokehcam_files::input::MAX_CALIBRATION_BYTES;
 
 /// The first bytes of a file: the ID of its first element.
@@ -58,9 +58,6 @@ const MAX_START_BYTES: u64 = 1 << 20;
 const DEFAULT_SCALE_NS: u64 = 1_000_000;
 /// The same for a file without that part: the recorder writes microseconds, and writes that part last.
 const RECORDER_SCALE_NS: u64 = 1000;
-
-/// A pass that takes longer is reported.
-const SLOW: Duration = Duration::from_secs(2);
 
 /// The fault of a file that was cut short, or of a wrong length in it.
 const CUT: &str = "it ends within an element";
@@ -164,8 +161,7 @@ struct Scanner<'a> {
     cluster_ticks: Option<u64>,
     definition_bytes: u64,
     block_count: usize,
-    began: Instant,
-    has_warned: bool,
+    search: SlowSearch,
 }
 
 impl<'a> Scanner<'a> {
@@ -183,14 +179,13 @@ impl<'a> Scanner<'a> {
             cluster_ticks: None,
             definition_bytes: 0,
             block_count: 0,
-            began: Instant::now(),
-            has_warned: false,
+            search: SlowSearch::begin(),
         }
     }
 
     fn scan(mut self, is_start: bool) -> io::Result<Contents> {
         while self.at < self.end {
-            self.warn_if_slow();
+            self.search.warn_if_slow(self.name, "looking through the file");
             self.cluster_end = self.cluster_end.filter(|&end| self.at < end);
             match self.scan_element(is_start) {
                 Ok(next) => self.at = next,
@@ -333,13 +328,6 @@ impl<'a> Scanner<'a> {
         let ticks = ticks.saturating_add_signed(i16::from_be_bytes([high, low]).into());
         track.blocks.push(Block { ticks, at: picture_at, length: length as u32 });
         Ok(())
-    }
-
-    fn warn_if_slow(&mut self) {
-        if !self.has_warned && self.began.elapsed() > SLOW {
-            self.has_warned = true;
-            tracing::warn!("{}: looking through the file; this takes long", self.name);
-        }
     }
 }
 

@@ -1,49 +1,10 @@
 //! The messages that are written: their definitions (`common_interfaces` of ROS 2), and their fields in CDR.
 
 /// The definition of `sensor_msgs/msg/CompressedImage`, with those that it contains.
-pub(super) const COMPRESSED_IMAGE: &str = "\
-std_msgs/Header header
-string format
-uint8[] data
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
+pub(super) const COMPRESSED_IMAGE: &str = include_str!("CompressedImage.msg");
 
 /// The definition of `sensor_msgs/msg/CameraInfo`, with those that it contains.
-pub(super) const CAMERA_INFO: &str = "\
-std_msgs/Header header
-uint32 height
-uint32 width
-string distortion_model
-float64[] d
-float64[9] k
-float64[9] r
-float64[12] p
-uint32 binning_x
-uint32 binning_y
-sensor_msgs/RegionOfInterest roi
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: sensor_msgs/RegionOfInterest
-uint32 x_offset
-uint32 y_offset
-uint32 height
-uint32 width
-bool do_rectify
-";
+pub(super) const CAMERA_INFO: &str = include_str!("CameraInfo.msg");
 
 /// A message under construction: little-endian CDR.
 #[derive(Debug, Default)]

@@ -4,6 +4,13 @@
 //! ROS 2 are CDR (OMG DDS-XTypes 1.3, 7.4.3): numbers are aligned to their size, and four bytes in front state the byte
 //! order. A text is its length and its bytes, in CDR with a zero at the end.
 
+/// A method for each kind of number, with its name.
+macro_rules! numbers {
+    ($($number:ident),*) => { $(pub fn $number(&mut self) -> Option<$number> {
+        self.number().map($number::from_le_bytes)
+    })* };
+}
+
 /// A cursor over fields. Every method returns `None` beyond the end.
 #[derive(Clone, Debug)]
 pub(super) struct Fields<'a> {
@@ -48,29 +55,7 @@ impl<'a> Fields<'a> {
         Some(number)
     }
 
-    pub fn u8(&mut self) -> Option<u8> {
-        self.number().map(u8::from_le_bytes)
-    }
-
-    pub fn u16(&mut self) -> Option<u16> {
-        self.number().map(u16::from_le_bytes)
-    }
-
-    pub fn u32(&mut self) -> Option<u32> {
-        self.number().map(u32::from_le_bytes)
-    }
-
-    pub fn i32(&mut self) -> Option<i32> {
-        self.number().map(i32::from_le_bytes)
-    }
-
-    pub fn u64(&mut self) -> Option<u64> {
-        self.number().map(u64::from_le_bytes)
-    }
-
-    pub fn f64(&mut self) -> Option<f64> {
-        self.number().map(f64::from_le_bytes)
-    }
+    numbers!(u8, u16, u32, i32, u64, f64);
 
     pub fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
         let mut numbers = [0.0; N];

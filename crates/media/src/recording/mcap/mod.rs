@@ -21,13 +21,13 @@ use std::path::{Path, PathBuf};
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, warn_of_damage};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
-use super::{Options, Unpaired, pair, timeline};
+use super::{Options, Unpaired, pair};
 use bokehcam::calibration::registration::RgbdCalibration;
 use bokehcam_files::input;
 use chunk::ChunkCache;
 use file::McapFile;
 use topic::{Message, Topic};
-pub use writer::Writer;
+pub(super) use writer::Writer;
 
 /// A file, or a folder of rosbag2 with one.
 pub(super) const LAYOUT: Layout =
@@ -103,8 +103,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let ending = || found.damage.as_ref().map_or(String::new(), |damage| format!("; {damage}"));
     let choice = topic::choose(&found.topics, &options.topics, &found.others)
         .map_err(|what| fault(format!("{what}{}", ending())))?;
-    let [color, depth] = [Some(choice.color), choice.depth].map(|at| at.map(|at| &found.topics[at]));
-    let Some(color) = color else { return Err(fault("it has no pictures".to_owned())) };
+    let (color, depth) = (&found.topics[choice.color], choice.depth.map(|at| &found.topics[at]));
     warn_of_damage(&name, found.damage.as_deref());
     if choice.is_guess {
         let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
@@ -113,7 +112,8 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let registered = depth.filter(|_| options.depth_calibration.is_none());
     let depth_calibration = registered.and_then(|depth| find_calibration(&found, &name, depth, color));
     options.warn_of_inverse_unit(&name, depth.is_some());
-    let (colors, frames, unpaired) = pair_frames(color, depth);
+    let frames = pair_frames(color, depth);
+    let unpaired = Unpaired::beside(frames.len(), color.messages.len(), depth.map(|depth| depth.messages.len()));
     if frames.is_empty() {
         let depth = depth.map_or(String::new(), |depth| depth.to_string());
         return Err(fault(format!(
@@ -121,13 +121,13 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
              --topic, or use --depth none"
         )));
     }
-    let listed = frames.iter().map(|&(at, depth_at)| ListedFrame {
-        time_ns: Some(colors[at].0),
-        color: color.source(colors[at].1),
+    let listed = frames.iter().map(|&(time_ns, color_at, depth_at)| ListedFrame {
+        time_ns: Some(time_ns),
+        color: color.source(color_at),
         right: None,
         depth: depth.zip(depth_at).map(|(depth, at)| depth.source(at)),
     });
-    let listed = listed.collect();
+    let listed: Vec<_> = listed.collect();
     let given = options.depth_unit.units_per_m().or(options.depth_scale);
     let invalid = options.depth_invalid.filter(|&invalid| invalid != 0);
     let units = DepthUnits { scale: given.unwrap_or(DEPTH_SCALE), invalid };
@@ -140,7 +140,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         topics: found.topics,
         chunks: found.chunks,
         chosen: [Some(choice.color), choice.depth],
-        frames: frames.into_iter().map(|(at, depth_at)| (colors[at].1, depth_at)).collect(),
+        frames: frames.into_iter().map(|(_, color, depth)| (color, depth)).collect(),
         units,
         cache: ChunkCache::default(),
     };
@@ -167,29 +167,21 @@ fn in_order(topic: &Topic, has_stamps: bool) -> Timed {
     timed
 }
 
-/// Pairs the pictures with the depth maps that were taken within half a frame. Returns the pictures in order, the frames
-/// (the position of a picture there, and that of the depth map in its topic), and the counts of unpaired ones.
-fn pair_frames(color: &Topic, depth: Option<&Topic>) -> (Timed, Vec<(usize, Option<usize>)>, Unpaired) {
+/// Pairs the pictures with the depth maps that were taken within half a frame. Returns the time of each frame, and the
+/// positions of its messages in their topics.
+fn pair_frames(color: &Topic, depth: Option<&Topic>) -> Vec<(u64, usize, Option<usize>)> {
     // Some drivers leave the times at 0.
-    let has_stamps =
-        [Some(color), depth].into_iter().flatten().flat_map(|topic| &topic.messages).all(|m| m.stamp_ns > 0);
+    let mut messages = [Some(color), depth].into_iter().flatten().flat_map(|topic| &topic.messages);
+    let has_stamps = messages.all(|message| message.stamp_ns > 0);
     let colors = in_order(color, has_stamps);
-    let Some(depth) = depth else {
-        let frames = (0..colors.len()).map(|at| (at, None)).collect();
-        return (colors, frames, Unpaired::default());
-    };
-    let depths = in_order(depth, has_stamps);
+    let depths = depth.map(|depth| in_order(depth, has_stamps));
     let times = |timed: &Timed| timed.iter().map(|&(time_ns, _)| time_ns).collect::<Vec<_>>();
-    let tolerance_ns = timeline::median_period_ns(times(&colors).into_iter()) / 2;
-    let partners = pair::pair_nearest(&times(&colors), &times(&depths), tolerance_ns);
-    let frames: Vec<_> =
-        partners.into_iter().enumerate().filter_map(|(at, depth)| Some((at, Some(depths[depth?].1)))).collect();
-    let unpaired = Unpaired {
-        color: color.messages.len() - frames.len(),
-        depth: depth.messages.len() - frames.len(),
-        ..Unpaired::default()
+    let pairs = pair::pair_frames(&times(&colors), depths.as_ref().map(times).as_deref());
+    let frame = |(color, depth): (usize, Option<usize>)| {
+        let depth = depths.as_ref().zip(depth).map(|(depths, at)| depths[at].1);
+        (colors[color].0, colors[color].1, depth)
     };
-    (colors, frames, unpaired)
+    pairs.into_iter().map(frame).collect()
 }
 
 impl Topic {

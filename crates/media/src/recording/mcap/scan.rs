@@ -7,7 +7,6 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek};
-use std::time::{Duration, Instant};
 
 use super::cameras;
 use super::channels::{Channels, Contents, MAX_TOPICS};
@@ -17,6 +16,7 @@ use super::message::{MAX_MESSAGE_BYTES, Preview};
 use super::topic::Message;
 use crate::recording::MAX_ENTRIES;
 use crate::recording::fault::PictureFault;
+use crate::recording::slow_search::SlowSearch;
 
 /// The first and the last bytes of a file.
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -46,9 +46,6 @@ const MAX_RATIO: u64 = 200;
 
 /// Buffer of the pass, small because most of a file is skipped.
 const BUFFER_BYTES: usize = 1 << 13;
-
-/// A pass that takes longer is reported.
-const SLOW: Duration = Duration::from_secs(2);
 
 /// The end of a part of the file.
 type End = Result<(), Damage>;
@@ -84,8 +81,7 @@ pub(super) fn scan(file: &File, name: &str) -> io::Result<Contents> {
         channels: Channels::default(),
         message_count: 0,
         bytes_left: MAX_DECOMPRESSED_BYTES.saturating_add(bytes.saturating_mul(MAX_RATIO)),
-        began: Instant::now(),
-        has_warned: false,
+        search: SlowSearch::begin(),
     };
     let mut reader = BufReader::with_capacity(BUFFER_BYTES, file);
     reader.seek(io::SeekFrom::Start(MAGIC.len() as u64))?;
@@ -106,8 +102,7 @@ struct Scanner<'a> {
     message_count: usize,
     /// Bytes that the chunks may still have after decompression.
     bytes_left: u64,
-    began: Instant,
-    has_warned: bool,
+    search: SlowSearch,
 }
 
 impl Scanner<'_> {
@@ -115,19 +110,12 @@ impl Scanner<'_> {
         self.found.damage.get_or_insert(what);
     }
 
-    fn warn_if_slow(&mut self) {
-        if !self.has_warned && self.began.elapsed() > SLOW {
-            self.has_warned = true;
-            tracing::warn!("{}: looking through the file; this takes long", self.name);
-        }
-    }
-
     /// Scans records up to `end`; `chunk` is the number of the compressed chunk that they are in.
     fn scan_records(&mut self, reader: &mut (impl Read + Seek), at: &mut u64, end: u64, chunk: Option<u32>) -> End {
         // End of the chunk without compression that these records are in.
         let mut chunk_end = None;
         while *at < end {
-            self.warn_if_slow();
+            self.search.warn_if_slow(self.name, "looking through the file");
             if end - *at < HEAD_BYTES {
                 return Err(Damage::Fault(CUT.to_owned()));
             }

@@ -73,10 +73,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     if frames.is_empty() {
         return Err(fault("no frame in it has both rgbd/N.jpg and rgbd/N.depth; export it again as .r3d".to_owned()));
     }
-    let unpaired = match has_depth {
-        true => Unpaired { color: counts[0] - frames.len(), depth: counts[1] - frames.len(), ..Unpaired::default() },
-        false => Unpaired::default(),
-    };
+    let unpaired = Unpaired::beside(frames.len(), counts[0], has_depth.then_some(counts[1]));
     let source = |name: &str| PictureSource::from_path(name.into());
     let times_ns = metadata.times_ns(frames.iter().map(|&(number, ..)| number));
     let listed = frames.iter().zip(times_ns).map(|((_, color, depth), time_ns)| ListedFrame {

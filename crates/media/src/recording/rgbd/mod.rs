@@ -86,7 +86,7 @@ pub(super) fn from_pairs(
     let by = by.describe();
     let rate = timeline::describe_rate(options);
     tracing::warn!("{}: {} pairs of colour and depth by their {by}, {rate}; {unit}", dir.display(), pairs.len());
-    let unpaired = Unpaired { color: counts[0] - pairs.len(), depth: counts[1] - pairs.len(), ..Unpaired::default() };
+    let unpaired = Unpaired::beside(pairs.len(), counts[0], Some(counts[1]));
     if unpaired != Unpaired::default() {
         let Unpaired { color, depth, .. } = unpaired;
         tracing::warn!(
