@@ -153,8 +153,7 @@ fn record_frames(
         writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
         let recorded = writer.frames() as u64;
         progress.set_delivered(recorded);
-        // A live source does not end by itself.
-        if info.live && info.frames.is_some_and(|frames| recorded >= frames) {
+        if info.is_complete(recorded) {
             break;
         }
     }

@@ -144,6 +144,13 @@ pub struct SourceInfo {
     pub frame_data: FrameData,
 }
 
+impl SourceInfo {
+    /// Returns whether a run that has delivered so many frames is complete, though its source, a live one, does not end.
+    pub fn is_complete(&self, delivered: u64) -> bool {
+        self.live && self.frames.is_some_and(|frames| delivered >= frames)
+    }
+}
+
 /// Result of reading a frame.
 #[derive(Debug)]
 pub enum Captured {

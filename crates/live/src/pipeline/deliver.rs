@@ -161,7 +161,7 @@ impl<'a> Stage<'a> {
     /// Whether a live source, which does not end by itself, has delivered as many frames as were asked of it.
     fn is_complete(&self) -> bool {
         let Shared { counter, info, .. } = self.shared;
-        info.live && info.frames.is_some_and(|frames| counter.frame_counts().delivered >= frames)
+        info.is_complete(counter.frame_counts().delivered)
     }
 
     /// Reports the progress of the run; `quality` is that of the last frame.

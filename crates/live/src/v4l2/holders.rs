@@ -32,15 +32,25 @@ impl fmt::Display for Holder {
 /// Lists the processes that have the device node `path` open, this one included. Other users' processes are missing
 /// without the rights to see them.
 pub fn list_holders(path: &Path) -> Vec<Holder> {
-    let Ok(device) = fs::metadata(path).map(|node| node.rdev()) else { return Vec::new() };
-    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
-    let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let describe = |pid| {
         let maps = fs::read_to_string(format!("/proc/{pid}/maps")).unwrap_or_default();
         Holder { pid, name: process_name(pid), has_buffers: maps_file(&maps, &real) }
     };
-    pids.filter(|pid| has_device_open(*pid, device)).map(describe).collect()
+    find_holders(path).map(describe).collect()
+}
+
+/// Returns whether any process but this one has the device node open.
+pub fn has_other_holders(path: &Path) -> bool {
+    find_holders(path).any(|pid| pid != std::process::id())
+}
+
+/// Finds the numbers of the processes that have the device node open.
+fn find_holders(path: &Path) -> impl Iterator<Item = u32> {
+    let device = fs::metadata(path).map(|node| node.rdev()).ok();
+    let processes = device.and_then(|_| fs::read_dir("/proc").ok()).into_iter().flatten().flatten();
+    let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    pids.filter(move |pid| device.is_some_and(|device| has_device_open(*pid, device)))
 }
 
 /// Lists the holders except this program.
@@ -77,6 +87,7 @@ mod tests {
         let open = fs::File::open("/dev/zero").unwrap();
         let own = list_holders(Path::new("/dev/zero")).into_iter().find(Holder::is_this_program);
         assert!(own.is_some_and(|own| !own.name.is_empty()));
+        assert!(!has_other_holders(Path::new("/dev/no-such-node")));
         drop(open);
         assert_eq!(list_holders(Path::new("/dev/no-such-node")), []);
     }

@@ -16,7 +16,7 @@ use rustix::io::Errno;
 
 use super::device::Device;
 use super::events::{PRIVATE_START, SEND_INITIAL};
-use super::holders::list_other_holders;
+use super::holders::has_other_holders;
 
 /// The module's event "client usage"; its data begin with a `u32`: 1 while a reader streams, else 0.
 const CLIENT_USAGE: u32 = PRIVATE_START + 0x08E0_0000 + 1;
@@ -97,7 +97,7 @@ impl ReaderMonitor {
                     }
                     drain_events(open_watch);
                 }
-                ReaderEvent::Readers(!list_other_holders(self.device.path()).is_empty())
+                ReaderEvent::Readers(has_other_holders(self.device.path()))
             }
         }
     }
