@@ -68,7 +68,7 @@ impl MapSequence {
         let files: Vec<_> = names.iter().map(|name| dir.join(name)).collect();
         let (mut options, mut notes) = (options, Vec::new());
         if let Some((scale, invalid, note)) =
-            files.first().filter(|_| options.scale.is_none()).and_then(|file| scale_beside(file))
+            files.first().filter(|_| options.scale.is_none()).and_then(|file| scale_beside(file, true))
         {
             (options.scale, options.invalid) =
                 (Some(scale), options.invalid.filter(|&invalid| invalid != 0.0).or(invalid));

@@ -43,9 +43,9 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Va
         values.stated = Some(MapUnit::Disparity { rig: rig.map(|geometry| geometry.rig) });
     } else if values.role == Role::InverseDepth {
         values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
-    } else if values.samples == Samples::Sixteen
+    } else if matches!(values.samples, Samples::Sixteen | Samples::Whole)
         && options.scale.is_none()
-        && let Some((per_m, invalid, note)) = scale_beside(path)
+        && let Some((per_m, invalid, note)) = scale_beside(path, values.samples == Samples::Sixteen)
     {
         (values.stated, values.invalid) = (Some(MapUnit::Depth { per_m }), invalid);
         values.notes.push(note);
@@ -53,10 +53,11 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Va
     values
 }
 
-/// Returns the units per metre of 16-bit maps like this one in its recording, the number that means unknown there, and a
-/// sentence about them; `None` if it belongs to none.
-pub(in crate::recording) fn scale_beside(path: &Path) -> Option<(f32, Option<f32>, String)> {
-    let stated = Scale::of_map(path)?.read().ok()?;
+/// Returns the units per metre of whole numbers like those of this map: a file of its recording or beside its picture states
+/// them, or they are those of the kind of recording, if `may_assume` allows that. Also returns the number that means unknown,
+/// and a sentence about both; `None` if the map belongs to nothing.
+pub(in crate::recording) fn scale_beside(path: &Path, may_assume: bool) -> Option<(f32, Option<f32>, String)> {
+    let stated = Scale::of_map(path)?.read().ok().filter(|stated| may_assume || !stated.are_assumed)?;
     let note = format!("has {} units per metre ({}; --depth-scale)", stated.per_m, stated.origin);
     Some((stated.per_m, stated.invalid.map(f32::from), note))
 }

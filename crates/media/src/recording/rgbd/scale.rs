@@ -34,13 +34,15 @@ pub(in crate::recording) enum Scale {
 pub(in crate::recording) struct StatedUnits {
     pub(in crate::recording) per_m: f32,
     pub(in crate::recording) invalid: Option<u16>,
+    /// Whether no file states them.
+    pub(in crate::recording) are_assumed: bool,
     /// What states them, for messages.
     pub(in crate::recording) origin: String,
 }
 
 impl StatedUnits {
     fn millimetres(origin: &str) -> Self {
-        Self { per_m: 1000.0, invalid: Some(u16::MAX), origin: origin.to_owned() }
+        Self { per_m: 1000.0, invalid: Some(u16::MAX), are_assumed: true, origin: origin.to_owned() }
     }
 }
 
@@ -121,7 +123,7 @@ impl Scale {
             },
             Self::Replica(None) => {
                 let origin = "assumed to be Replica, without cam_params.json".to_owned();
-                Ok(StatedUnits { per_m: REPLICA_SCALE, invalid: None, origin })
+                Ok(StatedUnits { per_m: REPLICA_SCALE, invalid: None, are_assumed: true, origin })
             }
             Self::Replica(Some(file)) => to_units(file, read_json::<CamParams>(file)?.camera.scale),
             Self::Bop(file) => {
@@ -150,7 +152,7 @@ fn to_units(file: &Path, per_m: f64) -> Result<StatedUnits, RecordingError> {
     let usable = Some(per_m as f32).filter(|per_m| *per_m > 0.0 && per_m.is_finite());
     let name = file.file_name().unwrap_or_default().display().to_string();
     match usable {
-        Some(per_m) => Ok(StatedUnits { per_m, invalid: None, origin: format!("from {name}") }),
+        Some(per_m) => Ok(StatedUnits { per_m, invalid: None, are_assumed: false, origin: format!("from {name}") }),
         None => {
             let what = format!("states {per_m} units per metre, which is not a scale > 0");
             Err(RecordingError::StatedScale { file: file.to_owned(), what })
