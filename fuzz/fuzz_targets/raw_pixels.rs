@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| bokehcam_fuzz::raw_pixels(data));
+libfuzzer_sys::fuzz_target!(init: bokehcam_fuzz::spare_caught_panics(), |data: &[u8]| bokehcam_fuzz::raw_pixels(data));

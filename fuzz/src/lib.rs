@@ -4,6 +4,10 @@
 //! libFuzzer (`scripts/fuzz`) calls these functions, and so does a plain test with the seeds and mutations of them
 //! (`crates/cli/tests/program/fuzz.rs`, which includes this file).
 
+use std::panic;
+
+use bokehcam::compute::is_catching_panics;
+
 mod calibrations;
 mod camera;
 mod input;
@@ -16,6 +20,16 @@ pub use camera::{mjpeg, raw_pixels};
 pub use pictures::{depth_map, embedded_depth, picture, snapshot};
 pub use recordings::{recording, recording_file};
 pub use texts::{command_line, settings};
+
+/// Lets panics pass that a caller catches, such as those of libraries: libFuzzer's own hook aborts at any.
+pub fn spare_caught_panics() {
+    let abort = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if !is_catching_panics() {
+            abort(info);
+        }
+    }));
+}
 
 /// A fuzz target: accepts any bytes, and panics on a broken guarantee.
 pub type Target = fn(&[u8]);

@@ -133,7 +133,8 @@ impl Scanner<'_> {
                 };
                 // What follows the chunk can be read.
                 self.note_damage(format!("{what} at byte {at}"));
-                reader.seek_relative((chunk_end - content_at) as i64)?;
+                // The record may begin before the end of the chunk, and its content behind.
+                reader.seek_relative(chunk_end as i64 - content_at as i64)?;
                 *at = chunk_end;
                 continue;
             }
