@@ -7,6 +7,7 @@ use std::process::Command;
 
 use bokehcam::engine::still;
 use bokehcam::frame::ColorImage;
+use bokehcam::frame::transform::{Flip, Rotation, Transform};
 use bokehcam::look::{Look, LookFacts, Metres, Strength};
 use bokehcam::optics::CocField;
 use bokehcam_live::source::options::Depth;
@@ -48,6 +49,37 @@ fn stream(home: &Home, arguments: &[&str]) -> Ran {
 
 fn frames(home: &Home, folder: &str) -> Vec<ColorImage> {
     (0..FRAMES).map(|frame| read_color(&home.path(folder).join(format!("{frame:06}.png"))).unwrap()).collect()
+}
+
+#[test]
+fn maps_are_turned_flipped_and_cut_as_their_pictures_are() {
+    let home = with_pictures(|frame| format!("{frame}.png"));
+    (0..FRAMES).for_each(|frame| write_map(&home.path("maps").join(format!("{frame}.png")), frame));
+    let turned = |rotation, flip| Transform { rotation, flip, area: None }.transform_color(picture(2));
+    let half = color(SIZE.0 / 2, SIZE.1, |x, y| [if (x / 2 + y / 2) % 2 == 0 { 120 } else { 20 }; 3]);
+    // The left half is near, and in focus.
+    let cases: [(&[&str], ColorImage, fn(f32, f32) -> bool); 4] = [
+        (&[], picture(2), |x, _| x < 0.5),
+        (&["--flip", "horizontal"], turned(Rotation::None, Flip::Horizontal), |x, _| x > 0.5),
+        (&["--rotate", "90"], turned(Rotation::Quarter, Flip::None), |_, y| y < 0.5),
+        (&["--crop", "48x64+0+0"], half, |_, _| true),
+    ];
+    for (options, expected, is_near) in cases {
+        let depth =
+            ["--depth", "maps", "--depth-unit", "millimetres", "--focus", "1", "--blur", "6", "--refine", "off"];
+        let ran = home
+            .run(&[&["stream", "shots", "--to", "out/", "--force", "--backend", "cpu"], &depth[..], options].concat());
+        ran.done();
+        let shown = frames(&home, "out").swap_remove(2);
+        assert_eq!(shown.size(), expected.size(), "{options:?}");
+        let (width, height) = (shown.width as usize, shown.height as usize);
+        let pixels = shown.rgb.as_chunks::<3>().0.iter().zip(expected.rgb.as_chunks::<3>().0).enumerate();
+        let (near, far): (Vec<_>, Vec<_>) = pixels
+            .partition(|(at, _)| is_near((at % width) as f32 / width as f32, (at / width) as f32 / height as f32));
+        let changed = |pixels: &[(usize, (&[u8; 3], &[u8; 3]))]| pixels.iter().filter(|(_, (a, b))| a != b).count();
+        assert!(changed(&near) * 20 < near.len(), "{options:?}: {} of {} near", changed(&near), near.len());
+        assert!(changed(&far) * 2 >= far.len(), "{options:?}: {} of {} far", changed(&far), far.len());
+    }
 }
 
 #[test]

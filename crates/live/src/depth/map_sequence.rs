@@ -10,20 +10,22 @@ pub struct SequenceDepth {
     maps: MapSequence,
     /// For maps of another camera's view.
     registration: Option<AnySizeRegistration>,
+    /// Width and height of the pictures that the maps are of.
+    color_px: (u32, u32),
 }
 
 impl SequenceDepth {
-    /// Creates a source of these maps, which are registered if there is a `registration`.
-    pub fn new(maps: MapSequence, registration: Option<AnySizeRegistration>) -> Self {
-        Self { maps, registration }
+    /// Creates a source of these maps of pictures of `color_px`, which are registered if there is a `registration`.
+    pub fn new(maps: MapSequence, registration: Option<AnySizeRegistration>, color_px: (u32, u32)) -> Self {
+        Self { maps, registration, color_px }
     }
 }
 
 impl DepthSource for SequenceDepth {
-    fn read(&mut self, FrameInput { stamp, color, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, FrameInput { stamp, .. }: FrameInput, map: &mut DepthMap) -> Result<(), DepthError> {
         match &mut self.registration {
             Some(registration) => registration.register(&self.maps.read_unfitted(stamp.index)?.map, map),
-            None => *map = self.maps.read(stamp.index, color.size())?.map,
+            None => *map = self.maps.read(stamp.index, self.color_px)?.map,
         }
         Ok(())
     }

@@ -38,7 +38,7 @@ pub(super) fn add_external_depth(
         return SourceError::usage_error("the source has its own depth: leave --depth out");
     }
     if let Some(folder) = choice.map_folder() {
-        return add_map_sequence(source, folder, name, request);
+        return add_map_sequence(source, folder, (name, transform), request);
     }
     let mut first_depth = None;
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
@@ -72,7 +72,7 @@ pub(super) fn add_external_depth(
 fn add_map_sequence(
     mut source: Source,
     folder: &Path,
-    name: &SourceName,
+    (name, transform): (&SourceName, &SourceTransform),
     request: &OpenRequest,
 ) -> Result<Source, SourceError> {
     let pictured = match name {
@@ -91,11 +91,13 @@ fn add_map_sequence(
     let (maps, notes) = MapSequence::open(folder, pictured, played, request.options.depth.of_photo())?;
     let depth_from = DepthOrigin::from(maps.distances());
     source.findings.notes.extend(notes);
-    let size = source.camera.info().size;
+    // The maps are of the source's own pictures.
+    let size = transform.own_px;
     let registration =
         if depth_from.is_relative() { None } else { registration::open(&request.options.depth, Some(size))? };
-    let first_depth = maps.read(0, size).ok().map(|file| file.map);
-    Ok(Source { depth: Some(Box::new(SequenceDepth::new(maps, registration))), depth_from, first_depth, ..source })
+    let first_depth = maps.read(0, size).ok().map(|file| transform.apply_to_map(file.map));
+    let depth = transform.apply_to_depth(Box::new(SequenceDepth::new(maps, registration, size)));
+    Ok(Source { depth: Some(depth), depth_from, first_depth, ..source })
 }
 
 /// Returns the number of frames up to the last one that is played, of a source with a frame every `period_ns`; `None` if
