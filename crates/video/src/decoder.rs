@@ -204,7 +204,7 @@ impl Decoder {
 }
 
 /// Draws pictures over white, as transparent photos are shown.
-const ON_WHITE: &str = "format=rgba,split[front][back];[back]lutrgb=r=255:g=255:b=255:a=255[white];\
+const ON_WHITE: &str = ",format=rgba,split[front][back];[back]lutrgb=r=255:g=255:b=255:a=255[white];\
                         [white][front]overlay=format=rgb,";
 
 /// Builds the command that writes the pictures of `file` to standard output, and their times to standard error.
@@ -218,10 +218,14 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
         true => format!("trim=start={:.9},", file.first_s + start_s),
         false => String::new(),
     };
-    let background = if file.has_alpha { ON_WHITE } else { "" };
+    let flags = format!("flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix}");
+    // The conversion to R'G'B' that drawing needs has the same matrix.
+    let background = match file.has_alpha && pixels == Pixels::Rgb24 {
+        true => format!("scale={flags}{ON_WHITE}"),
+        false => String::new(),
+    };
     let filters = format!(
-        "{begin}{fps}{background}scale={width}:{height}:flags=bicubic+accurate_rnd+full_chroma_int+bitexact{matrix},format={},\
-         settb=1/1000000000,showinfo=checksum=0",
+        "{begin}{fps}{background}scale={width}:{height}:{flags},format={},settb=1/1000000000,showinfo=checksum=0",
         pixels.name()
     );
     let mut command = base_command(FFMPEG);
@@ -233,6 +237,7 @@ fn decode_command(file: &VideoFile, conversion: &Conversion) -> Command {
     if seeks {
         command.args(["-ss", &format!("{:.6}", start_s + file.offset_s)]);
     }
+    command.args(file.alpha_decoder.iter().flat_map(|decoder| ["-c:v", decoder]));
     command
         // Times stay those of the file: otherwise ffmpeg counts from the first picture or sound that it uses, or from the
         // start of the file, as the format has it.

@@ -46,6 +46,8 @@ pub struct VideoFile {
     pub assumed_matrix: Option<YcbcrMatrix>,
     /// Whether its pictures may be transparent.
     pub has_alpha: bool,
+    /// The decoder that reads their alpha, where the usual one does not.
+    pub alpha_decoder: Option<&'static str>,
     /// Whether there is sound.
     pub has_sound: bool,
     /// Whether there are subtitles.
@@ -77,6 +79,7 @@ struct Container {
 struct Stream {
     index: u32,
     codec_type: Option<String>,
+    codec_name: Option<String>,
     pix_fmt: Option<String>,
     field_order: Option<String>,
     time_base: Option<String>,
@@ -94,6 +97,8 @@ struct Stream {
     #[serde(default)]
     side_data_list: Vec<SideData>,
     disposition: Disposition,
+    #[serde(default)]
+    tags: BTreeMap<String, String>,
 }
 
 #[derive(Default, Deserialize)]
@@ -150,6 +155,7 @@ impl VideoFile {
             is_transport_stream: answer.format.format_name.as_deref() == Some("mpegts"),
             assumed_matrix: video.color_space.is_none().then(|| YcbcrMatrix::for_height(size.1)),
             has_alpha: video.has_alpha(),
+            alpha_decoder: video.alpha_decoder(),
             has_sound: has("audio"),
             has_subtitles: has("subtitle"),
             has_tags: !answer.format.tags.is_empty(),
@@ -184,9 +190,18 @@ impl Stream {
     fn has_alpha(&self) -> bool {
         const NAMES: [&str; 8] = ["yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ayuv", "pal8"];
         let is_grey_alpha = |name: &str| matches!(name, "ya8" | "ya16le" | "ya16be");
-        self.pix_fmt
-            .as_deref()
-            .is_some_and(|name| is_grey_alpha(name) || NAMES.iter().any(|alpha| name.contains(alpha)))
+        let is_stated = |name: &str| is_grey_alpha(name) || NAMES.iter().any(|alpha| name.contains(alpha));
+        self.pix_fmt.as_deref().is_some_and(is_stated) || self.alpha_decoder().is_some()
+    }
+
+    /// Returns the decoder of a VP8 or VP9 with alpha, which is a second stream in it that ffmpeg's own decoders leave out.
+    fn alpha_decoder(&self) -> Option<&'static str> {
+        let has_mode = self.tags.iter().any(|(name, mode)| name.eq_ignore_ascii_case("alpha_mode") && mode == "1");
+        match self.codec_name.as_deref().filter(|_| has_mode) {
+            Some("vp8") => Some("libvpx"),
+            Some("vp9") => Some("libvpx-vp9"),
+            _ => None,
+        }
     }
 
     /// Returns what is to be said of it, as one of several tracks of pictures.
@@ -221,9 +236,9 @@ fn probe_command(path: &Path) -> Command {
         .args(INPUT_OPTIONS)
         .args(["-of", "json", "-show_entries"])
         .arg(
-            "stream=index,codec_type,pix_fmt,field_order,time_base,start_pts,width,height,sample_aspect_ratio,color_space,\
+            "stream=index,codec_type,codec_name,pix_fmt,field_order,time_base,start_pts,width,height,sample_aspect_ratio,color_space,\
              color_transfer,avg_frame_rate,r_frame_rate,nb_frames,start_time,duration:\
-             stream_disposition=default,attached_pic:stream_side_data=rotation:format=format_name,start_time,duration:\
+             stream_disposition=default,attached_pic:stream_tags=alpha_mode:stream_side_data=rotation:format=format_name,start_time,duration:\
              format_tags=title,artist,date,creation_time,location,comment,description",
         )
         .arg(file_url(path))
@@ -323,6 +338,7 @@ mod tests {
             is_transport_stream: false,
             assumed_matrix: None,
             has_alpha: false,
+            alpha_decoder: None,
             has_sound: false,
             has_subtitles: false,
             has_tags: false,

@@ -83,7 +83,12 @@ fn what_is_transparent_is_in_front_of_white() {
     let half = "color=red:s=64x48:r=10:d=0.3,format=rgba,geq=r=255:g=0:b=0:a='if(lt(X,32),255,0)'";
     // A palette in which one number is transparent.
     let paletted = format!("{half},split[a][b];[a]palettegen[p];[b][p]paletteuse");
-    for (file, filter, codec) in [("half.mov", half, &["-c:v", "png"][..]), ("half.gif", &*paletted, &[])] {
+    for (file, filter, codec) in [
+        ("half.mov", half, &["-c:v", "png"][..]),
+        ("half.gif", &*paletted, &[]),
+        ("vp9.webm", half, &["-c:v", "libvpx-vp9", "-lossless", "1", "-pix_fmt", "yuva420p"]),
+        ("vp8.webm", half, &["-c:v", "libvpx", "-auto-alt-ref", "0", "-b:v", "1M", "-pix_fmt", "yuva420p"]),
+    ] {
         make(&home, &[&source(filter)[..], codec, &[file]].concat());
         home.run(&["stream", file, "--effect", "none", "--to", "out/", "--force"]).done();
         let picture = read_color(&home.path("out/000001.png")).unwrap();
@@ -91,6 +96,16 @@ fn what_is_transparent_is_in_front_of_white() {
         assert!(pixel(8).iter().zip([255, 0, 0]).all(|(a, b)| a.abs_diff(b) < 8), "{file}: {:?}", pixel(8));
         assert!(pixel(56).iter().all(|&code| code > 250), "{file}: {:?}", pixel(56));
     }
+    // An alpha channel does not change the matrix of large pictures, where none is stated.
+    let [opaque, alpha] = ["yuv444p", "yuva444p"].map(|pixels| {
+        let file = format!("{pixels}.mkv");
+        let hd = source("color=0xfa5b29:s=1280x720:r=10:d=0.1");
+        make(&home, &[&hd[..], &["-c:v", "ffv1", "-pix_fmt", pixels, &file]].concat());
+        home.run(&["stream", &file, "--effect", "none", "--to", "out/", "--force"]).done();
+        let picture = read_color(&home.path("out/000000.png")).unwrap();
+        [picture.rgb[0], picture.rgb[1], picture.rgb[2]]
+    });
+    assert!(opaque.iter().zip(alpha).all(|(a, b)| a.abs_diff(b) <= 2), "{opaque:?} and {alpha:?}");
 }
 
 #[test]

@@ -11,6 +11,7 @@ use crate::depth::video::VideoDepth;
 use crate::sink::Sound;
 use bokehcam::depth::DepthError;
 use bokehcam_files::input;
+use bokehcam_media::recording::DepthUnit;
 use bokehcam_media::recording::depth_file::has_same_view;
 use bokehcam_media::recording::still;
 use bokehcam_video::{VideoError, VideoFile};
@@ -69,13 +70,18 @@ pub(super) fn parse(path: &Path) -> Option<Result<SourceName, SourceError>> {
     (path.is_file() && is_video(path)).then(|| Ok(SourceName::Video(path.to_owned())))
 }
 
+/// Says what was chosen about a video, or is not shown as it should be.
+fn warn_of_remarks(file: &VideoFile) {
+    file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", file.path.display()));
+}
+
 /// Opens a video file. `by_index` counts frames from the first one of the file, also after `--start`.
 ///
 /// # Errors
 /// The file is not a readable video, the range has no frame, or an option does not fit.
 pub(super) fn open(path: &Path, frames: &Frames, by_index: bool) -> Result<Video, SourceError> {
     let file = VideoFile::open(path).map_err(CaptureError::from)?;
-    file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", path.display()));
+    warn_of_remarks(&file);
     let size_px = frames.size.map_or(file.size_px, |size| (size.width, size.height));
     if !has_same_view(size_px, file.size_px) {
         let ((width, height), (from_width, from_height)) = (size_px, file.size_px);
@@ -129,6 +135,18 @@ pub(super) fn open_depth(
         && frames != needed
     {
         return Err(DepthError::from(VideoError::FrameCount { path: depth.path, frames, needed }).into());
+    }
+    let unused = [
+        (options.depth_unit.is_some_and(|unit| unit != DepthUnit::Inverse), "--depth-unit"),
+        (options.depth_fit.is_some(), "--depth-fit"),
+        (options.depth_invalid != 0, "--depth-invalid"),
+    ];
+    for (_, option) in unused.iter().filter(|(is_given, _)| *is_given) {
+        tracing::warn!("without effect here: {option} (a video of depth is relative)");
+    }
+    warn_of_remarks(&depth);
+    if depth.has_alpha {
+        tracing::warn!("{}: its transparency is ignored", file.display());
     }
     let near = if options.depth_invert { "black" } else { "white" };
     tracing::info!("{}: relative depth, {near} is near; --depth-invert takes the other end", file.display());
