@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use image::ImageError;
 
-use super::{MAX_PIXELS, MAX_SIDE_PX};
+use super::{MAX_PIXELS, MAX_SIDE_PX, RecordingError};
 
 /// A fault in a line of a list.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -211,6 +211,9 @@ pub enum PictureFault {
          --depth-invert if {} is near", ends[0], ends[1]
     )]
     ColorMapped { name: &'static str, ends: Box<[&'static str; 2]> },
+    /// What states the scale of a depth map is faulty.
+    #[error("{0}")]
+    Scale(Box<RecordingError>),
     /// The picture is not a depth map.
     #[error(
         "{0} is not depth; export depth as a 16-bit grey PNG; for inverse depth, where white is near, use --depth-unit \

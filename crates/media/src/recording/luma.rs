@@ -6,28 +6,33 @@ use super::coded::EncodedPicture;
 use super::decode::{Scratch, check_depth_size};
 use super::fault::PictureFault;
 use super::photo_metadata::PhotoMetadata;
-use super::samples::GREY_TOLERANCE;
+use super::samples::{GREY_TOLERANCE, MAX_COLORED};
 use bokehcam::color::luminance;
 use bokehcam::frame::DepthMap;
 
 /// Decodes relative inverse depth (8 or 16 bits, grey, or RGB with grey content) to distances relative to the nearest
-/// one. A map that does not cover a picture of `color` pixels is rejected.
+/// one; what is transparent, or has the code `invalid`, is unknown. A map that does not cover a picture of `color` pixels is
+/// rejected, and so are colours.
 pub(super) fn read_inverse_depth(
     path: &Path,
-    white_is_far: bool,
+    (white_is_far, invalid): (bool, Option<u16>),
     color: (u32, u32),
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let found = coded.size();
+    let (found, white) = (coded.size(), coded.samples().white());
     check_depth_size(found, color)?;
     into.resize(found.0, found.1);
-    decode_grey(coded, &mut scratch.pixels, &mut into.metres)?;
-    for value in &mut into.metres {
-        *value = DepthMap::relative_to_metres(if white_is_far { 1.0 - *value } else { *value });
-    }
-    Ok(())
+    let mut colored = 0;
+    decode_luma(coded, &mut scratch.pixels, |at, LumaPixel { luma, alpha, is_colored }| {
+        colored += usize::from(is_colored && alpha > 0.0);
+        let is_unknown = alpha == 0.0 || invalid == Some((luma * white).round() as u16);
+        let near = if white_is_far { 1.0 - luma } else { luma };
+        into.metres[at] = if is_unknown { 0.0 } else { DepthMap::relative_to_metres(near) };
+    })?;
+    let is_grey = colored as f32 <= MAX_COLORED * into.metres.len() as f32;
+    if is_grey { Ok(()) } else { Err(PictureFault::ColoredDepth) }
 }
 
 /// Decodes to width, height and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
@@ -37,12 +42,8 @@ pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFaul
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let (width, height) = coded.size();
     let mut grey = vec![0.0; width as usize * height as usize];
-    decode_grey(coded, &mut scratch.pixels, &mut grey)?;
+    decode_luma(coded, &mut scratch.pixels, |at, pixel| grey[at] = pixel.luma * pixel.alpha)?;
     Ok((width, height, grey))
-}
-
-fn decode_grey(coded: EncodedPicture, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
-    decode_luma(coded, pixels, |at, pixel| grey[at] = pixel.luma * pixel.alpha).map(drop)
 }
 
 /// A pixel as stored (not linearised), 0 to 1.
@@ -61,9 +62,8 @@ pub(super) fn decode_luma(
     mut on_pixel: impl FnMut(usize, LumaPixel),
 ) -> Result<PhotoMetadata, PictureFault> {
     let samples = coded.samples();
-    coded.decode_runs(pixels, |run, row| {
-        let places = (run.first..).step_by(run.step);
-        for (at, pixel) in places.zip(row.chunks_exact(samples.bytes_per_pixel())) {
+    coded.decode_runs(pixels, |first, row| {
+        for (at, pixel) in (first..).zip(row.chunks_exact(samples.bytes_per_pixel())) {
             let sample = |channel: usize| f32::from(samples.code(pixel, channel)) / samples.white();
             let (luma, chroma) = match samples.has_color() {
                 true => {

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::depth_file::{self, DepthFile, Distances, scale_beside};
+use super::depth_file::{self, DepthFile, Distances};
 use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
 use super::folder::{Ambiguous, PairKey, find_files, has_files, pair_stems};
@@ -67,8 +67,12 @@ impl MapSequence {
         let missing = names.iter().collect::<HashSet<_>>().difference(&found.iter().collect()).count();
         let files: Vec<_> = names.iter().map(|name| dir.join(name)).collect();
         let (mut options, mut notes) = (options, Vec::new());
-        if let Some((scale, invalid, note)) =
-            files.first().filter(|_| options.scale.is_none()).and_then(|file| scale_beside(file, true))
+        // One scale for all, read once.
+        let is_open = options.scale.is_none() && options.unit.is_none() && !options.invert;
+        if let Some((scale, invalid, note)) = files
+            .first()
+            .filter(|_| is_open)
+            .map_or(Ok(None), |file| depth_file::find_scale(file).map_err(RecordingError::picture(file)))?
         {
             (options.scale, options.invalid) =
                 (Some(scale), options.invalid.filter(|&invalid| invalid != 0.0).or(invalid));

@@ -12,7 +12,7 @@ use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::FileKind;
 use super::luma::{self, LumaPixel};
-use super::samples::GREY_TOLERANCE;
+use super::samples::{GREY_TOLERANCE, MAX_COLORED};
 use super::upright::upright;
 use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
@@ -22,8 +22,6 @@ const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
 
 /// Largest code of a mask that numbers objects: far darker than any coverage that is meant.
 const MAX_LABEL: f32 = 31.0;
-/// Share of the pixels whose colours may differ from a mask.
-const MAX_SHARE: f32 = 0.005;
 
 /// A mask that was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +95,7 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
         unequal += usize::from(alpha - luma * alpha > GREY_TOLERANCE);
         colored += usize::from(is_colored && alpha > 0.0);
     })?;
-    let is_many = |count: usize| count as f32 > MAX_SHARE * pixels as f32;
+    let is_many = |count: usize| count as f32 > MAX_COLORED * pixels as f32;
     let reading = match () {
         () if highest - lowest > GREY_TOLERANCE => Reading::Alpha,
         () if background.is_some() && colored > 0 => Reading::Labels,

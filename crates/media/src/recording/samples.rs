@@ -3,6 +3,9 @@
 /// Difference of channels, 0 to 1, up to which a pixel is grey: compression makes such.
 pub(super) const GREY_TOLERANCE: f32 = 8.0 / 255.0;
 
+/// Share of pixels with colours up to which a picture is grey.
+pub(super) const MAX_COLORED: f32 = 0.005;
+
 /// Channels and bit depth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleFormat {

@@ -18,6 +18,7 @@ mod pictures;
 mod real;
 mod registered;
 mod rgbd;
+mod siblings;
 mod single_file;
 mod still;
 mod writer;

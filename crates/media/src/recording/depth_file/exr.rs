@@ -28,7 +28,7 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
     for header in reader.headers() {
         check_side(header)?;
     }
-    let Choice { layer, channels: wanted, note } = layers::choose(reader.headers())
+    let Choice { layer, role, channels: wanted, note } = layers::choose(reader.headers())
         .ok_or_else(|| PictureFault::NotAMap("an EXR without a layer of depth (Z, or one named depth)".to_owned()))?;
     let header = &reader.headers()[layer].clone();
     let size = check_side(header)?;
@@ -63,7 +63,7 @@ pub(super) fn read(file: File) -> Result<Values, PictureFault> {
         colors.check(pixels)?;
     }
     let (size, numbers) = place_in_display(header, numbers.swap_remove(0))?;
-    Ok(Values { size, numbers, samples: Samples::Float, notes: note.into_iter().collect(), ..Values::default() })
+    Ok(Values { size, numbers, role, notes: note.into_iter().collect(), ..Values::default() })
 }
 
 /// Places the numbers of the data window in the display window, the frame that all layers and renderings of a scene share:

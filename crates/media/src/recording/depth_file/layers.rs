@@ -10,6 +10,8 @@ const MAX_CHANNELS: usize = 1024;
 /// The layer and the channel with depth.
 pub(super) struct Choice {
     pub layer: usize,
+    /// What its name states.
+    pub role: Role,
     /// The channel, and others that must be equal to it.
     pub channels: Vec<usize>,
     /// What was chosen of several.
@@ -46,6 +48,7 @@ pub(super) fn choose(headers: &[Header]) -> Option<Choice> {
     let name = name.trim_matches([' ', '.']);
     Some(Choice {
         layer: chosen.layer,
+        role: chosen.role(),
         channels: [vec![chosen.channel], chosen.colors_beside()].concat(),
         note: (equals > 1)
             .then(|| format!("has {equals} layers that may be the depth, of which {name} is taken, the first")),
@@ -71,19 +74,25 @@ impl<'a> Candidate<'a> {
         self.header.own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default()
     }
 
-    /// Returns its place in the order of preference; `None` if it is no depth.
-    fn rank(&self) -> Option<usize> {
-        let role = match Role::of_name(&format!("{} {}", self.part(), self.prefix)) {
+    /// Returns what its layer is by name, or else the channel.
+    fn role(&self) -> Role {
+        match Role::of_name(&format!("{} {}", self.part(), self.prefix)) {
             Role::Unstated => Role::of_name(&self.last),
             stated => stated,
-        };
+        }
+    }
+
+    /// Returns its place in the order of preference; `None` if it is no depth.
+    fn rank(&self) -> Option<usize> {
+        let role = self.role();
         let is_standard = self.letter == "Z" && self.prefix.is_empty() && self.part().is_empty();
         match role {
             _ if self.is_of_vector() || matches!(&*self.letter, "G" | "B" | "A") => None,
             Role::Depth if is_standard => Some(0),
             Role::Depth => Some(1 + Role::count_other_words(&self.prefix).min(7)),
-            Role::Unstated if ["Z", "V", "Y", "X"].contains(&&*self.letter) => Some(9),
-            Role::Unstated if self.letter == "R" => Some(10),
+            Role::Disparity | Role::InverseDepth => Some(9),
+            Role::Unstated if ["Z", "V", "Y", "X"].contains(&&*self.letter) => Some(10),
+            Role::Unstated if self.letter == "R" => Some(11),
             _ => None,
         }
     }

@@ -19,7 +19,6 @@ use std::path::Path;
 
 pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, has_other_view, read_inside};
-pub(super) use stated::scale_beside;
 pub use unit::DepthUnit;
 #[doc(hidden)]
 pub use values::has_colors;
@@ -32,7 +31,7 @@ use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam_files::input;
 use color_map::ColorMapped;
 use meaning::Meaning;
-use values::Values;
+use values::{Samples, Values};
 
 /// File formats of depth maps, for messages.
 const FORMATS: &str = "PNG, JPEG, TIFF, PFM, PGM, NPY, NPZ or EXR";
@@ -121,7 +120,7 @@ fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
         Err(PictureFault::ColoredDepth) if matches!(options.unit, None | Some(DepthUnit::Inverse)) => {
             color_map::read(path)?
         }
-        read => return read.map(|values| stated::complete(values, path, options)),
+        read => return stated::complete(read?, path, options),
     };
     let ColorMapped { mut values, name, ends: [near, far] } = colored;
     if options.unit.is_none() && !options.invert {
@@ -135,13 +134,10 @@ fn read_values(path: &Path, options: &Options) -> Result<Values, PictureFault> {
 /// Reads a map; the first bytes decide its format.
 fn read_numbers(path: &Path) -> Result<Values, PictureFault> {
     let mut file = input::open(path).map_err(open_fault)?;
-    let mut start = [0; 8];
-    let mut length = 0;
-    while let read @ 1.. = file.read(&mut start[length..])? {
-        length += read;
-    }
+    let mut start = Vec::new();
+    (&mut file).take(8).read_to_end(&mut start)?;
     file.rewind()?;
-    match &start[..length] {
+    match &start[..] {
         [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => {
             let mut values = Values::default();
             (values.size, values.stated) = pfm::parse(&read_whole(file)?, &mut values.numbers)?;
@@ -170,8 +166,24 @@ fn read_codes(path: &Path) -> Result<Values, PictureFault> {
         PictureFault::Format(_) => PictureFault::Format(FORMATS),
         fault => fault,
     })?;
-    let (values, mut metadata) = values::decode_codes(coded)?;
+    let (mut values, mut metadata) = values::decode_codes(coded)?;
+    if let Some(white) = coded::read_pnm_white(path) {
+        let factor = white / values.samples.white();
+        values.numbers.iter_mut().for_each(|number| *number = (*number * factor).round());
+    }
     Ok(Values { stated: stated::read_text(path), ..values }.turned(metadata.take_orientation()))
+}
+
+/// Returns the units per metre that are stated beside the map `path`, the number that means unknown there, and a sentence
+/// about both; `None` if there are none, or the map has no need of them.
+///
+/// # Errors
+/// What states them is faulty.
+pub(super) fn find_scale(path: &Path) -> Result<Option<(f32, Option<f32>, String)>, PictureFault> {
+    match read_numbers(path).ok().filter(|values| values.stated.is_none()).map(|values| values.samples) {
+        Some(samples @ (Samples::Sixteen | Samples::Whole)) => stated::scale_beside(path, samples == Samples::Sixteen),
+        _ => Ok(None),
+    }
 }
 
 /// Reads the range of the numbers of relative depth, for [`Options::range`]; `None` if the map has metres.

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::values::{Samples, Values};
 use super::{DepthUnit, Options};
 use crate::recording::coded;
+use crate::recording::fault::PictureFault;
 use crate::recording::geometry::Geometry;
 use crate::recording::middlebury;
 use crate::recording::rgbd::Scale;
@@ -22,12 +23,12 @@ pub(super) fn read_text(path: &Path) -> Option<MapUnit> {
 }
 
 /// Adds what name and neighbours of the file `path` say of numbers of which neither the file nor the options state it.
-pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Values {
+pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Result<Values, PictureFault> {
     if values.stated.is_some() || options.unit.is_some_and(|unit| unit != DepthUnit::Disparity) || options.invert {
-        return values;
+        return Ok(values);
     }
     if values.role == Role::Unstated {
-        values.role = Role::of_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+        values.role = role_of(path);
     }
     let is_disparity = values.role == Role::Disparity || options.unit == Some(DepthUnit::Disparity);
     if is_disparity {
@@ -44,20 +45,36 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Va
     } else if values.role == Role::InverseDepth {
         values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
     } else if matches!(values.samples, Samples::Sixteen | Samples::Whole)
+        && options.unit.is_none()
         && options.scale.is_none()
-        && let Some((per_m, invalid, note)) = scale_beside(path, values.samples == Samples::Sixteen)
+        && let Some((per_m, invalid, note)) = scale_beside(path, values.samples == Samples::Sixteen)?
     {
         (values.stated, values.invalid) = (Some(MapUnit::Depth { per_m }), invalid);
         values.notes.push(note);
     }
-    values
+    Ok(values)
+}
+
+/// Returns the role that the name of a file states, or that of its folder if its own is a number.
+fn role_of(path: &Path) -> Role {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+    Role::of_name(if stem.contains(char::is_alphabetic) { &stem } else { &folder })
 }
 
 /// Returns the units per metre of whole numbers like those of this map: a file of its recording or beside its picture states
 /// them, or they are those of the kind of recording, if `may_assume` allows that. Also returns the number that means unknown,
 /// and a sentence about both; `None` if the map belongs to nothing.
-pub(in crate::recording) fn scale_beside(path: &Path, may_assume: bool) -> Option<(f32, Option<f32>, String)> {
-    let stated = Scale::of_map(path)?.read().ok().filter(|stated| may_assume || !stated.are_assumed)?;
+///
+/// # Errors
+/// The file is faulty.
+pub(in crate::recording) fn scale_beside(
+    path: &Path,
+    may_assume: bool,
+) -> Result<Option<(f32, Option<f32>, String)>, PictureFault> {
+    let Some(scale) = Scale::of_map(path) else { return Ok(None) };
+    let stated = scale.read().map_err(|error| PictureFault::Scale(Box::new(error)))?;
     let note = format!("has {} units per metre ({}; --depth-scale)", stated.per_m, stated.origin);
-    Some((stated.per_m, stated.invalid.map(f32::from), note))
+    let found = (stated.per_m, stated.invalid.map(f32::from), note);
+    Ok(Some(found).filter(|_| may_assume || !stated.are_assumed))
 }

@@ -37,6 +37,9 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
     let mut decoder = decoder.with_limits(limits);
     let tag = decoder.find_tag_unsigned::<u8>(Tag::Orientation).ok().flatten();
     let orientation = tag.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
+    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten();
+    // Some writers do not say that it is alpha; 0 says that it is not.
+    let may_be_alpha = !matches!(extra.as_deref(), Some([0, ..]));
     // Takes the first of several channels, which must be nearly equal (grey).
     let to_values = |samples, white, stored: Vec<f32>| {
         let channels = (stored.len() / pixels).max(1);
@@ -45,11 +48,13 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
             1 => stored,
             _ => stored
                 .chunks_exact(channels)
-                .map(|pixel| {
-                    if let [r, g, b, ..] = *pixel {
+                .map(|pixel| match *pixel {
+                    [.., alpha] if alpha == 0.0 && may_be_alpha && channels.is_multiple_of(2) => f32::NAN,
+                    [r, g, b, ..] => {
                         colors.add([r, g, b]);
+                        r
                     }
-                    pixel[0]
+                    _ => pixel[0],
                 })
                 .collect(),
         };

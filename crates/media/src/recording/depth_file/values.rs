@@ -6,7 +6,7 @@ use crate::recording::coded::EncodedPicture;
 use crate::recording::fault::PictureFault;
 use crate::recording::photo_metadata::PhotoMetadata;
 use crate::recording::role::Role;
-use crate::recording::samples::GREY_TOLERANCE;
+use crate::recording::samples::{GREY_TOLERANCE, MAX_COLORED};
 use crate::recording::unit::{self, MapUnit};
 use crate::recording::upright::upright;
 
@@ -78,17 +78,15 @@ pub(super) fn decode_codes(coded: EncodedPicture) -> Result<(Values, PhotoMetada
     let sample = |pixel: &[u8], channel: usize| f32::from(format.code(pixel, channel));
     let samples = if format.is_16bit { Samples::Sixteen } else { Samples::Eight };
     let mut colors = ColorCount::new(samples.white());
-    let metadata = coded.decode_runs(&mut Vec::new(), |run, row| {
-        let places = numbers[run.first..].iter_mut().step_by(run.step);
-        for (number, pixel) in places.zip(row.chunks_exact(format.bytes_per_pixel())) {
+    let metadata = coded.decode_runs(&mut Vec::new(), |first, row| {
+        for (number, pixel) in numbers[first..].iter_mut().zip(row.chunks_exact(format.bytes_per_pixel())) {
             *number = sample(pixel, 0);
-            if format.has_color() {
+            if format.has_alpha() && sample(pixel, format.channels - 1) == 0.0 {
+                *number = f32::NAN;
+            } else if format.has_color() {
                 let rgb = [*number, sample(pixel, 1), sample(pixel, 2)];
                 colors.add(rgb);
                 *number = rgb[1];
-            }
-            if format.has_alpha() && sample(pixel, format.channels - 1) == 0.0 {
-                *number = f32::NAN;
             }
         }
     })?;
@@ -103,9 +101,6 @@ pub(super) struct ColorCount {
 }
 
 impl ColorCount {
-    /// Share of coloured pixels above which a picture is not grey.
-    const MAX_SHARE: f32 = 0.005;
-
     pub fn new(white: f32) -> Self {
         Self { tolerance: GREY_TOLERANCE * white, count: 0 }
     }
@@ -119,7 +114,7 @@ impl ColorCount {
     /// # Errors
     /// The picture has colours.
     pub fn check(&self, pixels: usize) -> Result<(), PictureFault> {
-        let is_colored = self.count as f32 > Self::MAX_SHARE * pixels as f32;
+        let is_colored = self.count as f32 > MAX_COLORED * pixels as f32;
         if is_colored { Err(PictureFault::ColoredDepth) } else { Ok(()) }
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use super::{LAYOUT, find_pair};
 use crate::recording::error::RecordingError;
@@ -44,16 +45,6 @@ impl StatedUnits {
     fn millimetres(origin: &str) -> Self {
         Self { per_m: 1000.0, invalid: Some(u16::MAX), are_assumed: true, origin: origin.to_owned() }
     }
-}
-
-#[derive(Deserialize)]
-struct CamParams {
-    camera: ReplicaCamera,
-}
-
-#[derive(Deserialize)]
-struct ReplicaCamera {
-    scale: f64,
 }
 
 /// The scales of Instant NGP and SplaTAM, and of Nerfstudio.
@@ -125,7 +116,11 @@ impl Scale {
                 let origin = "assumed to be Replica, without cam_params.json".to_owned();
                 Ok(StatedUnits { per_m: REPLICA_SCALE, invalid: None, are_assumed: true, origin })
             }
-            Self::Replica(Some(file)) => to_units(file, read_json::<CamParams>(file)?.camera.scale),
+            Self::Replica(Some(file)) => {
+                let scale = read_json::<Value>(file)?["camera"]["scale"].as_f64();
+                let what = "states no number camera.scale".to_owned();
+                to_units(file, scale.ok_or_else(|| RecordingError::StatedScale { file: file.clone(), what })?)
+            }
             Self::Bop(file) => {
                 let cameras: BTreeMap<String, BopCamera> = read_json(file)?;
                 let fault = |what: String| RecordingError::StatedScale { file: file.clone(), what };

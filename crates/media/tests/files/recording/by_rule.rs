@@ -156,37 +156,6 @@ fn a_map_has_the_scale_of_its_folder_alone_and_in_a_sequence() {
 }
 
 #[test]
-fn whole_numbers_of_any_file_have_the_scale_that_is_stated_beside_them() {
-    let codes: Vec<u16> = (0..8).map(|k| 15_000 + 100 * k).collect();
-    let array = npy("<u2", false, "2, 4", &codes.iter().flat_map(|code| code.to_le_bytes()).collect::<Vec<u8>>());
-    let most_first: Vec<u8> = codes.iter().flat_map(|code| code.to_be_bytes()).collect();
-    let picture = ImageBuffer::<Luma<u16>, _>::from_raw(4, 2, codes).unwrap();
-    for ending in ["png", "pgm", "tif", "npy", "npz"] {
-        let dir = TempDir::new().unwrap();
-        let path = dir.path().join(format!("1_depth.{ending}"));
-        match ending {
-            "npy" => fs::write(&path, &array).unwrap(),
-            "npz" => fs::write(&path, npz(&[("depth.npy", &array)])).unwrap(),
-            "pgm" => fs::write(&path, [&b"P5\n4 2\n65535\n"[..], &most_first].concat()).unwrap(),
-            _ => picture.save(&path).unwrap(),
-        }
-        // What no file states is assumed of the pictures that cameras write.
-        let is_assumed = ["png", "pgm"].contains(&ending);
-        let check = |metres: f32, is_sure: bool| match read(&path) {
-            Ok(file) if is_sure || is_assumed => assert!((file.map.metres[0] - metres).abs() < 1e-4, "{ending}"),
-            found => assert_says(found, &[ending, "whole numbers of an unknown unit"]),
-        };
-        check(3.0, false);
-        image::RgbImage::from_fn(4, 2, |x, y| [x as u8 * 50, y as u8, 9].into())
-            .save(dir.path().join("1.jpg"))
-            .unwrap();
-        check(15.0, false);
-        fs::write(dir.path().join("transforms.json"), r#"{"integer_depth_scale": 0.0005}"#).unwrap();
-        check(7.5, true);
-    }
-}
-
-#[test]
 fn pictures_and_maps_are_told_apart_and_paired() {
     let times = |n: u32, step: u32| format!("{:07}-{:012}", n + 1, n * step);
     type Name = Box<dyn Fn(u32) -> String>;
