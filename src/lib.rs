@@ -13,7 +13,8 @@
 //! | `bokehcam-cli`, `bokehcam-window` | the program, and its live preview |
 //! | `bokehcam-lab` | for developers: a scene with exact depth, and the benches |
 //! | `bokehcam-live` | cameras, outputs, the threads of a run, sources by name, control of a running program |
-//! | `bokehcam-media` | recordings, photos, videos, calibration files, networks |
+//! | `bokehcam-media`, `bokehcam-video`, `bokehcam-networks` | recordings, photos and depth maps; videos; networks |
+//! | `bokehcam-calibration`, `bokehcam-files` | files of stereo calibrations; files of users, whole and within limits |
 //! | `bokehcam` | this engine |
 //! | `bokehcam-link` | hand-over of frames between threads |
 //!

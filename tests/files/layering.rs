@@ -50,7 +50,7 @@ const DOORS: [(&str, &[&str]); 29] = [
     ("egui_winit", &["window/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
     ("image_webp", &["recording/encode"]),
-    ("jiff", &["files/user_folders"]),
+    ("jiff", &["files/user_folders", "recording/kitti"]),
     ("lz4_flex", &["recording/mcap"]),
     ("lzfse_rust", &["recording/record3d"]),
     ("moxcms", &["recording/color_space"]),

@@ -1,4 +1,9 @@
-//! Neural networks for bokehcam: [`network`] runs them, [`single_camera`] makes mattes and depth of what they give.
+//! Neural networks for bokehcam.
+//!
+//! | layer | modules |
+//! |---|---|
+//! | 1 | [`single_camera`]: mattes and depth of one camera |
+//! | 0 | [`network`]: loads and runs networks, without trusting their files |
 
 pub mod network;
 pub mod single_camera;

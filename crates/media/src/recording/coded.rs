@@ -2,14 +2,14 @@
 //!
 //! The memory for a file is bounded before it is decoded: at most [`MAX_SIDE_PX`](super::MAX_SIDE_PX) columns and rows, and
 //! [`MAX_PIXELS`](super::MAX_PIXELS) pixels.
-//! Besides the pixels, a PNG needs one row; a JPEG needs three times the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per
+//! Besides the pixels, a PNG needs one row, or all if it is interlaced; a JPEG needs three times the file (up to [`MAX_JPEG_BYTES`]) and 6 bytes per
 //! pixel; other files need what `decoders` allows.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-use image::codecs::{gif::GifDecoder, webp::WebPDecoder};
+use image::codecs::{gif::GifDecoder, pnm::PnmDecoder, webp::WebPDecoder};
 use image::metadata::Orientation;
 use image::{AnimationDecoder, ColorType, ImageDecoder, ImageFormat};
 
@@ -21,8 +21,7 @@ use super::fault::{PictureFault, decoder_fault, open_fault, png_fault};
 use super::file_kind::{self, FileKind};
 use super::heif;
 use super::jpeg;
-use super::photo_metadata::PhotoMetadata;
-use super::pixel_runs::{PixelRun, png_pixel_runs};
+use super::photo_metadata::{self, PhotoMetadata};
 use super::samples::SampleFormat;
 use bokehcam_files::input;
 
@@ -88,7 +87,7 @@ impl<'a> EncodedPicture<'a> {
     pub(super) fn icc_profile(&mut self) -> Option<Vec<u8>> {
         match self {
             Self::Png(reader) => color_space::of_png(reader.info()),
-            Self::Whole(decoder) => guard(|| decoder.icc_profile().map_err(decoder_fault)).ok().flatten(),
+            Self::Whole(decoder) => guard(|| Ok(photo_metadata::profile_of(&mut **decoder))).ok().flatten(),
         }
     }
 
@@ -125,23 +124,16 @@ impl<'a> EncodedPicture<'a> {
                 decoder.read_image(into).map_err(decoder_fault)?;
                 Ok(metadata)
             }),
-            other => other.decode_runs(memory, |run, row| {
-                if run.step == 1 {
-                    into[3 * run.first..][..row.len()].copy_from_slice(row);
-                } else {
-                    let pixels = into.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
-                    pixels.zip(row.as_chunks::<3>().0).for_each(|(pixel, read)| *pixel = *read);
-                }
-            }),
+            other => other.decode_runs(memory, |first, row| into[3 * first..][..row.len()].copy_from_slice(row)),
         }
     }
 
-    /// Decodes the picture and calls `on_run` for every run of pixels with its bytes, in the format of
-    /// [`EncodedPicture::samples`]: a row of a PNG, or a whole picture. `memory` is working memory.
+    /// Decodes the picture and calls `on_run` for every run of pixels with the index of its first one and its bytes, in the
+    /// format of [`EncodedPicture::samples`]: a row of a PNG, or a whole picture. `memory` is working memory.
     pub(super) fn decode_runs(
         self,
         memory: &mut Vec<u8>,
-        on_run: impl FnMut(PixelRun, &[u8]),
+        on_run: impl FnMut(usize, &[u8]),
     ) -> Result<PhotoMetadata, PictureFault> {
         guard(|| self.decode_runs_unguarded(memory, on_run))
     }
@@ -149,17 +141,24 @@ impl<'a> EncodedPicture<'a> {
     fn decode_runs_unguarded(
         mut self,
         memory: &mut Vec<u8>,
-        mut on_run: impl FnMut(PixelRun, &[u8]),
+        mut on_run: impl FnMut(usize, &[u8]),
     ) -> Result<PhotoMetadata, PictureFault> {
         let bytes_per_pixel = self.samples().bytes_per_pixel();
         let (width, height) = self.size();
         let (width, height) = (width as usize, height as usize);
         match self {
+            Self::Png(ref mut reader) if reader.info().interlaced => {
+                memory.resize(width * height * bytes_per_pixel, 0);
+                reader.next_frame(memory).map_err(png_fault)?;
+                on_run(0, memory);
+                let _ = reader.finish();
+                Ok(PhotoMetadata::from_png(reader.info()))
+            }
             Self::Png(ref mut reader) => {
                 memory.resize(width * bytes_per_pixel, 0);
-                for (run, pixels) in png_pixel_runs(width, height, reader.info().interlaced) {
+                for row in 0..height {
                     reader.read_row(memory).map_err(png_fault)?.ok_or(PictureFault::Truncated)?;
-                    on_run(run, &memory[..pixels * bytes_per_pixel]);
+                    on_run(row * width, memory);
                 }
                 // Reading beyond the last row makes the decoder check the end of the coded data.
                 reader.read_row(memory).map_err(png_fault)?;
@@ -177,7 +176,7 @@ impl<'a> EncodedPicture<'a> {
                     let samples = memory.as_chunks_mut().0;
                     samples.iter_mut().for_each(|sample| *sample = u16::from_ne_bytes(*sample).to_be_bytes());
                 }
-                on_run(PixelRun { first: 0, step: 1 }, memory);
+                on_run(0, memory);
                 Ok(metadata)
             }
         }
@@ -206,6 +205,13 @@ pub(super) fn read_header(path: &Path) -> Result<((u32, u32), SampleFormat), Pic
     Ok((size, samples))
 }
 
+/// Returns the largest number of a PNM, such as 4095: the decoder scales its numbers to all bits of a sample.
+pub(super) fn read_pnm_white(path: &Path) -> Option<f32> {
+    let (file, _) = open_detected(path).ok().filter(|(_, kind)| *kind == Some(FileKind::Other(ImageFormat::Pnm)))?;
+    let header = guard(|| Ok(PnmDecoder::new(BufReader::new(file)).map_err(decoder_fault)?.into_inner().1));
+    Some(header.ok()?.maximal_sample() as f32)
+}
+
 /// Reads the header of a PNG and the metadata before its pixels.
 pub(super) fn read_png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
     let (file, kind) = open_detected(path)?;
@@ -230,10 +236,7 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
     let (file, kind) = open_detected(path)?;
     let of_exif = |exif: &[u8]| Orientation::from_exif_chunk(exif);
     let orientation = guard(|| match kind {
-        Some(FileKind::Png) => {
-            let info = create_png_decoder(file)?.read_info().map_err(png_fault)?;
-            Ok(info.info().exif_metadata.as_deref().and_then(of_exif))
-        }
+        Some(FileKind::Png) => Ok(read_png_exif(file)?.as_deref().and_then(of_exif)),
         Some(FileKind::Jpeg) => {
             let mut start = Vec::new();
             file.take(MAX_EXIF_START_BYTES).read_to_end(&mut start)?;
@@ -243,6 +246,26 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
         _ => Ok(None),
     });
     Ok(orientation?.unwrap_or(Orientation::NoTransforms))
+}
+
+/// Returns the EXIF of a PNG, which may stand behind the pixels.
+fn read_png_exif(file: File) -> std::io::Result<Option<Vec<u8>>> {
+    let mut file = BufReader::new(file);
+    file.seek_relative(8)?;
+    loop {
+        let mut head = [0; 8];
+        file.read_exact(&mut head)?;
+        let length = head[..4].iter().fold(0, |length, &byte| length << 8 | u64::from(byte));
+        match &head[4..] {
+            b"eXIf" => {
+                let mut exif = Vec::new();
+                file.take(length.min(MAX_EXIF_START_BYTES)).read_to_end(&mut exif)?;
+                return Ok(Some(exif));
+            }
+            b"IEND" => return Ok(None),
+            _ => file.seek_relative(length as i64 + 4)?,
+        }
+    }
 }
 
 /// Returns the orientation tag of a picture that is stored as a JPEG or PNG; `None` if it cannot be read.

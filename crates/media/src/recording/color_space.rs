@@ -82,6 +82,11 @@ pub(super) fn chunks_of_png(info: &png::Info) -> Vec<([u8; 4], Vec<u8>)> {
     [gamma, primaries, points, size].into_iter().flatten().map(|(ChunkType(name), data)| (name, data)).collect()
 }
 
+/// Returns the profile of Adobe RGB (1998).
+pub(super) fn adobe_rgb() -> Option<Vec<u8>> {
+    ColorProfile::new_adobe_rgb().encode().ok()
+}
+
 /// Returns whether a chunk of a PNG states colours.
 pub(super) fn is_color_chunk(name: [u8; 4]) -> bool {
     name != png::chunk::pHYs.0

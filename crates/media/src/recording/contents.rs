@@ -134,6 +134,8 @@ pub(super) enum DepthFormat {
     /// Relative inverse depth in grey pictures: black is the farthest and white the nearest, or the other way round.
     Inverse {
         white_is_far: bool,
+        /// A code that means unknown.
+        invalid: Option<u16>,
     },
     /// Disparities in a PFM; the rig belongs to the colour pictures at their size.
     Disparity(StereoRig),
@@ -143,7 +145,11 @@ impl DepthFormat {
     /// Returns the format of depth pictures that are read with `options`, and have `scale` units per metre by default.
     pub(super) fn of_pictures(options: &Options, scale: f32) -> Self {
         match options.depth_unit {
-            DepthUnit::Inverse => Self::Inverse { white_is_far: options.depth_invert },
+            DepthUnit::Inverse => Self::Inverse {
+                white_is_far: options.depth_invert,
+                // 0 is the farthest or the nearest.
+                invalid: options.depth_invalid.filter(|&invalid| invalid != 0),
+            },
             unit => {
                 let scale = unit.units_per_m().or(options.depth_scale).unwrap_or(scale);
                 Self::Units(DepthUnits { scale, invalid: options.depth_invalid })

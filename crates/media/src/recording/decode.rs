@@ -148,10 +148,14 @@ pub(super) fn decode_stored_color(
         return coded.decode_rgb(pixels, &mut into.rgb);
     }
     let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-    let mut metadata = coded.decode_runs(pixels, |run, row| {
-        let pixels = into.rgb.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
-        for (rgb, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
-            let sample = |channel: usize| round_to_8bit(samples.code_16bit(pixel, channel));
+    let mut metadata = coded.decode_runs(pixels, |first, row| {
+        for (rgb, pixel) in
+            into.rgb.as_chunks_mut::<3>().0[first..].iter_mut().zip(row.chunks_exact(samples.bytes_per_pixel()))
+        {
+            let sample = |channel: usize| match samples.is_16bit {
+                true => round_to_8bit(samples.code(pixel, channel)),
+                false => pixel[channel],
+            };
             *rgb = channels.map(sample);
             if samples.has_alpha() {
                 let alpha = sample(samples.channels - 1);
@@ -194,6 +198,8 @@ pub(super) fn read_depth(
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
+    let white = if matches!(coded, EncodedPicture::Png(_)) { None } else { coded::read_pnm_white(path) };
+    let units = white.map_or(units, |white| units.scaled(f32::from(u16::MAX) / white));
     decode_depth(coded, units, color_size, &mut scratch.pixels, into)
 }
 
@@ -217,19 +223,20 @@ pub(super) fn decode_depth(
     color_size.map_or(Ok(()), |color| check_depth_size(found, color))?;
     into.resize(found.0, found.1);
     let arch = Arch::new();
-    coded.decode_runs(pixels, |run, row| {
-        let (values, metres) = (row.as_chunks().0, &mut into.metres[run.first..]);
-        if run.step == 1 {
-            arch.dispatch(ConvertToMetres { values, units, metres });
-        } else {
-            let pixels = metres.iter_mut().step_by(run.step).zip(values);
-            pixels.for_each(|(metres, value)| *metres = units.to_metres(*value));
-        }
+    coded.decode_runs(pixels, |first, row| {
+        let (values, metres) = (row.as_chunks().0, &mut into.metres[first..]);
+        arch.dispatch(ConvertToMetres { values, units, metres });
     })?;
     Ok(())
 }
 
 impl DepthUnits {
+    /// Returns the units of codes that are multiplied.
+    fn scaled(self, factor: f32) -> Self {
+        let invalid = self.invalid.map(|code| (f32::from(code) * factor).round() as u16);
+        Self { scale: self.scale * factor, invalid }
+    }
+
     /// Converts a big-endian value to metres; 0 if it is unknown.
     #[inline(always)]
     pub(super) fn to_metres(self, value: [u8; 2]) -> f32 {

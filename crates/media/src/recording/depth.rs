@@ -18,18 +18,18 @@ use bokehcam::optics::StereoRig;
 impl Recording {
     /// Returns whether the frames have depth.
     pub fn has_depth(&self) -> bool {
-        self.depth.is_some()
+        self.contents.depth.is_some()
     }
 
     /// Returns whether its depth is only relative.
     pub fn has_relative_depth(&self) -> bool {
-        matches!(self.depth, Some(DepthFormat::Inverse { .. }))
+        matches!(self.contents.depth, Some(DepthFormat::Inverse { .. }))
     }
 
     /// Returns whether its depth is in the units of [`Options::depth_scale`](super::Options::depth_scale), and not in
     /// units that it states itself.
     pub fn has_depth_in_units(&self) -> bool {
-        matches!(self.depth, Some(DepthFormat::Units(_)))
+        matches!(self.contents.depth, Some(DepthFormat::Units(_)))
     }
 
     /// Returns the recording with its depth registered, if there are distances and a calibration: the depth camera looks
@@ -94,26 +94,26 @@ impl Recording {
     /// is to be registered.
     fn decode_depth(&self, index: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> Result<()> {
         let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
-        let form = self.depth.as_ref().ok_or_else(no_depth)?;
+        let form = self.contents.depth.as_ref().ok_or_else(no_depth)?;
         let frame = self.frame(index)?;
         // Without a depth map, the line of the colour picture is at fault.
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
-        let read = match &self.container {
+        let read = match &self.contents.container {
             Some(container) => container.read_depth(index, size, scratch, into),
             None => {
                 let path = self.folder.locate(source)?;
                 // Maps of photos are turned as photos are.
-                let tag = self.are_photos.then(|| coded::read_orientation(&path).ok()).flatten();
+                let tag = self.contents.are_photos.then(|| coded::read_orientation(&path).ok()).flatten();
                 let turn = upright(tag.unwrap_or(Orientation::NoTransforms));
                 let stored_size = turn.rotated_size(size);
                 let read = match form {
                     DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
                         decode::read_depth(&path, *units, Some(stored_size), scratch, into)
                     }
-                    DepthFormat::Inverse { white_is_far } => {
-                        luma::read_inverse_depth(&path, *white_is_far, stored_size, scratch, into)
+                    DepthFormat::Inverse { white_is_far, invalid } => {
+                        luma::read_inverse_depth(&path, (*white_is_far, *invalid), stored_size, scratch, into)
                     }
-                    DepthFormat::Disparity(rig) => read_disparity(&path, rig, stored_size).map(|map| *into = map),
+                    DepthFormat::Disparity(rig) => read_disparity(&path, rig, stored_size, into),
                 };
                 if !turn.is_identity() {
                     *into = turn.transform_map(mem::take(into), stored_size);
@@ -136,9 +136,10 @@ impl Recording {
 
 /// Reads disparities, in pixels of the map, as depth. The rig is for the colour picture of `color` pixels, whose view the map
 /// must cover.
-fn read_disparity(path: &Path, rig: &StereoRig, color: (u32, u32)) -> ReadResult<DepthMap> {
+fn read_disparity(path: &Path, rig: &StereoRig, color: (u32, u32), into: &mut DepthMap) -> ReadResult {
     let map = depth_file::read_disparity(path)?;
     decode::check_depth_size(map.size(), color)?;
     let zoom = color.0 as f32 / map.width as f32;
-    Ok(map.to_depth_map(|px| rig.depth_m(px * zoom)))
+    *into = map.to_depth_map(|px| rig.depth_m(px * zoom));
+    Ok(())
 }

@@ -45,7 +45,6 @@ mod pfm;
 mod photo;
 mod photo_metadata;
 pub mod pictures;
-mod pixel_runs;
 mod raw_image;
 mod record3d;
 mod rgbd;
@@ -81,7 +80,7 @@ use bokehcam::calibration::StereoCalibration;
 use bokehcam::calibration::registration::Registration;
 use bokehcam::frame::{ColorImage, GrayImage};
 use bokehcam::optics::StereoRig;
-use contents::{Container, DepthFormat, Layout, PictureSource, RecordingFolder};
+use contents::{Contents, Layout, ListedFrame, RecordingFolder};
 
 /// The supported layouts, in order of detection.
 const LAYOUTS: [Layout; 9] = [
@@ -143,29 +142,13 @@ pub enum StereoGeometry {
 pub struct Recording {
     layout: &'static str,
     folder: RecordingFolder,
-    /// The pictures, if they are in a single file.
-    container: Option<Box<dyn Container>>,
-    frames: Vec<Frame>,
+    contents: Contents,
+    /// Times of the frames.
+    times_ns: Vec<u64>,
     size: (u32, u32),
     period_ns: u64,
-    depth: Option<DepthFormat>,
     /// For depth of another camera's view.
     depth_registration: Option<Registration>,
-    stereo_geometry: Option<StereoGeometry>,
-    disparity_count: Option<u32>,
-    unpaired: Unpaired,
-    has_times: bool,
-    are_photos: bool,
-    is_chosen_by_size: bool,
-}
-
-/// A frame whose pictures are on disk.
-#[derive(Debug)]
-struct Frame {
-    time_ns: u64,
-    color: PictureSource,
-    right: Option<PictureSource>,
-    depth: Option<PictureSource>,
 }
 
 /// Returns whether a file is a recording by itself.
@@ -192,7 +175,7 @@ impl Recording {
             dir: dir.to_owned(),
             expected_files: LAYOUTS.map(|layout| layout.describe_files()).join(", "),
         };
-        let (layout, contents) = match pattern_folder {
+        let (layout, mut contents) = match pattern_folder {
             Some(_) => (&pictures::LAYOUT, pictures::open_pattern(&folder, path, options)?),
             None => {
                 let layout = LAYOUTS.iter().find(|layout| (layout.matches)(dir)).ok_or_else(not_a_recording)?;
@@ -200,33 +183,18 @@ impl Recording {
             }
         };
 
-        folder.maps_root = contents.maps_root;
+        folder.maps_root = contents.maps_root.take();
         let sources = contents.frames.iter().map(|frame| &frame.color);
         let read_size = if contents.are_photos { decode::read_upright_size } else { decode::read_size };
         let size = contents::read_first_size(&folder, contents.container.as_deref(), sources, read_size)?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
-        let listed = contents.frames.into_iter().zip(timeline::interpolate_times(&times_ns));
-        let frames: Vec<_> = listed
-            .map(|(frame, time_ns)| Frame { time_ns, color: frame.color, right: frame.right, depth: frame.depth })
-            .collect();
-        let recording = Self {
-            layout: layout.name,
-            folder,
-            container: contents.container,
-            size,
-            period_ns: timeline::median_period_ns(frames.iter().map(|frame| frame.time_ns)),
-            frames,
-            depth: contents.depth,
-            depth_registration: None,
-            stereo_geometry: contents.stereo_geometry,
-            disparity_count: contents.disparity_count,
-            unpaired: contents.unpaired,
-            has_times: contents.has_times,
-            are_photos: contents.are_photos,
-            is_chosen_by_size: contents.is_chosen_by_size,
-        };
+        let times_ns = timeline::interpolate_times(&times_ns);
+        let period_ns = timeline::median_period_ns(times_ns.iter().copied());
+        let calibration = options.depth_calibration.or(contents.depth_calibration);
+        let layout = layout.name;
+        let recording = Self { layout, folder, contents, times_ns, size, period_ns, depth_registration: None };
         let is_given = options.depth_calibration.is_some();
-        recording.register_depth(options.depth_calibration.or(contents.depth_calibration), is_given)
+        recording.register_depth(calibration, is_given)
     }
 
     /// Returns the name of the layout, such as `TUM RGB-D`.
@@ -236,12 +204,12 @@ impl Recording {
 
     /// Returns the number of frames, including those that will fail to read.
     pub fn len(&self) -> usize {
-        self.frames.len()
+        self.contents.frames.len()
     }
 
     /// Returns whether there are no frames; never true for an opened recording.
     pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
+        self.contents.frames.is_empty()
     }
 
     /// Returns width and height of the colour pictures: those of the first one with a readable header.
@@ -255,7 +223,7 @@ impl Recording {
     /// # Panics
     /// `index` is not below [`Recording::len`].
     pub fn time_ns(&self, index: usize) -> u64 {
-        self.frames[index].time_ns
+        self.times_ns[index]
     }
 
     /// Returns the median frame period in nanoseconds, > 0; that of 30 frames per second if there is only one frame.
@@ -265,12 +233,12 @@ impl Recording {
 
     /// Returns whether its times are recorded, so that [`Options::period_ns`] does not count.
     pub fn has_times(&self) -> bool {
-        self.has_times
+        self.contents.has_times
     }
 
     /// Returns whether [`Options::size`] chose its scenes.
     pub fn is_chosen_by_size(&self) -> bool {
-        self.is_chosen_by_size
+        self.contents.is_chosen_by_size
     }
 
     /// Returns whether [`Options::topics`] can choose its pictures.
@@ -280,23 +248,23 @@ impl Recording {
 
     /// Returns the file names of the colour pictures, without extension; empty for lines that name none.
     pub fn picture_stems(&self) -> Vec<String> {
-        let stem = |frame: &Frame| frame.color.file.as_deref().ok()?.file_stem()?.to_str().map(str::to_owned);
-        self.frames.iter().map(|frame| stem(frame).unwrap_or_default()).collect()
+        let stem = |frame: &ListedFrame| frame.color.file.as_deref().ok()?.file_stem()?.to_str().map(str::to_owned);
+        self.contents.frames.iter().map(|frame| stem(frame).unwrap_or_default()).collect()
     }
 
     /// Returns the stereo geometry, if the frames have right pictures.
     pub fn stereo_geometry(&self) -> Option<&StereoGeometry> {
-        self.stereo_geometry.as_ref()
+        self.contents.stereo_geometry.as_ref()
     }
 
     /// Returns the number of disparities to search, from 0, if the recording states it: a multiple of 16.
     pub fn disparity_count(&self) -> Option<u32> {
-        self.disparity_count
+        self.contents.disparity_count
     }
 
     /// Returns the counts of listed pictures without a frame.
     pub fn unpaired(&self) -> Unpaired {
-        self.unpaired
+        self.contents.unpaired
     }
 
     /// Reads the colour picture of frame `index`, of [`Recording::size`], into `into`.
@@ -306,12 +274,12 @@ impl Recording {
     /// list is faulty; there is no such frame. The content of `into` is then unspecified.
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
-        if let Some(container) = &self.container {
+        if let Some(container) = &self.contents.container {
             let read = container.read_color(index, self.size, scratch, into);
             return read.map_err(|fault| source.error(&self.folder.dir, fault));
         }
         let path = self.folder.locate(source)?;
-        let read = match self.are_photos {
+        let read = match self.contents.are_photos {
             true => decode::read_upright(&path, self.size, scratch, into),
             false => decode::read_color(&path, Some(self.size), scratch, into).map(drop),
         };
@@ -325,14 +293,14 @@ impl Recording {
     pub fn read_right(&self, index: usize, scratch: &mut Scratch, into: &mut GrayImage) -> Result<(), RecordingError> {
         let no_right_picture = || RecordingError::NoRight { dir: self.folder.dir.clone() };
         let frame = self.frame(index)?;
-        self.stereo_geometry.as_ref().ok_or_else(no_right_picture)?;
+        self.contents.stereo_geometry.as_ref().ok_or_else(no_right_picture)?;
         // Without a right picture, the line of the left one is at fault.
         let source = frame.right.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
         decode::read_right_luma(&path, self.size, scratch, into).map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
-    fn frame(&self, index: usize) -> Result<&Frame, RecordingError> {
-        self.frames.get(index).ok_or(RecordingError::NoSuchFrame { index, len: self.frames.len() })
+    fn frame(&self, index: usize) -> Result<&ListedFrame, RecordingError> {
+        self.contents.frames.get(index).ok_or(RecordingError::NoSuchFrame { index, len: self.contents.frames.len() })
     }
 }

@@ -69,9 +69,8 @@ impl Photo {
         let mut codes = has_codes.then(|| Picture16::new(size, curves));
         let mut alpha = samples.has_alpha().then(|| vec![0; photo.color.rgb.len() / 3]);
         let channels = if samples.has_color() { [0, 1, 2] } else { [0; 3] };
-        photo.metadata = coded.decode_runs(&mut Vec::new(), |run, row| {
-            let pixels = row.chunks_exact(samples.bytes_per_pixel()).enumerate();
-            for (at, pixel) in pixels.map(|(k, pixel)| (run.first + k * run.step, pixel)) {
+        photo.metadata = coded.decode_runs(&mut Vec::new(), |first, row| {
+            for (at, pixel) in (first..).zip(row.chunks_exact(samples.bytes_per_pixel())) {
                 match &mut codes {
                     Some(codes) => {
                         codes.rgb.as_chunks_mut::<3>().0[at] =

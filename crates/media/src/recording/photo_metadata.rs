@@ -73,7 +73,7 @@ impl PhotoMetadata {
         let orientation = decoder.orientation().ok().filter(|turned| *turned != Orientation::NoTransforms);
         let exif = exif.or_else(|| orientation.map(exif_of_orientation));
         let mut metadata = Self { exif, ..Self::default() };
-        metadata.set_profile(decoder.icc_profile().ok().flatten());
+        metadata.set_profile(profile_of(decoder));
         if let Some(packet) = decoder.xmp_metadata().ok().flatten() {
             metadata.set_xmp(Ok(packet));
         }
@@ -163,6 +163,18 @@ impl PhotoMetadata {
         self.lost_properties.extend(lost.into_iter().flatten());
         self
     }
+}
+
+/// Returns the colour profile of a picture: its own, or Adobe RGB if its EXIF says so, as cameras write it (DCF 2.0, "R03").
+pub(super) fn profile_of(decoder: &mut dyn ImageDecoder) -> Option<Vec<u8>> {
+    decoder.icc_profile().ok().flatten().or_else(|| {
+        let exif = decoder.exif_metadata().ok().flatten()?;
+        let file = TiffDirectories::parse(&exif)?;
+        let follow = |directory, tag| file.u32_at(file.find_tag(directory, tag)? + 8);
+        let interoperability = follow(follow(file.u32_at(4)?, 0x8769)?, 0xA005)?;
+        let is_adobe = file.entries(interoperability).any(|(tag, _, value)| tag == 1 && value.starts_with(b"R03"));
+        is_adobe.then(color_space::adobe_rgb)?
+    })
 }
 
 /// Returns EXIF with the orientation only.

@@ -8,7 +8,7 @@ use super::{mcap, tum};
 use bokehcam::frame::{ColorImage, DepthMap};
 
 /// How the frames of a recording are stored.
-pub(super) trait Storage {
+pub(super) trait Storage: Send + Sync {
     /// Stores frame `number`, from 0, which has `time_ns` of any clock.
     fn add(&mut self, number: usize, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<()>;
 
@@ -30,8 +30,7 @@ pub(super) trait Storage {
 ///   millimetres, 0 = unknown) for depth, each with a `CameraInfo` that says that the camera is not calibrated.
 ///
 /// An earlier recording stays until the new one is whole. [`RecordingWriter::finish`] or
-/// [`RecordingWriter::finish_incomplete`] must end it; otherwise it cannot be
-/// read.
+/// [`RecordingWriter::finish_incomplete`] must end it; otherwise it cannot be read.
 pub struct RecordingWriter {
     to: PathBuf,
     frames: FrameSequence,
@@ -41,7 +40,7 @@ pub struct RecordingWriter {
 impl RecordingWriter {
     /// Starts a recording at `to`: an MCAP file if its name ends so and it is not a folder, else a folder, which is created
     /// if needed. An unfinished recording of a killed process in that folder gets its lists first. `overwrite` allows to
-    /// replace an existing recording of this program, once the new one is complete.
+    /// replace an existing file, or a recording of this program in the folder, once the new one is complete.
     ///
     /// # Errors
     /// The file or folder has content that may not be replaced; another process writes it, or it cannot be written.
@@ -58,7 +57,7 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// The frame does not fit the recording: its time is not after the last one, the size of the colour picture differs
-    /// from the first, or the depth map does not cover it. Or a file cannot be written.
+    /// from the first, or the depth map does not cover it. Or a file cannot be written; a folder is unchanged then.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<()> {
         self.frames.check(time_ns, color, depth)?;
         self.storage.add(self.frames.count(), time_ns, color, depth)?;
@@ -98,9 +97,6 @@ impl RecordingWriter {
     }
 
     fn check_not_empty(&self) -> Result<()> {
-        match self.frames.count() {
-            0 => Err(RecordingError::NothingRecorded { dir: self.to.clone() }),
-            _ => Ok(()),
-        }
+        if self.frames() > 0 { Ok(()) } else { Err(RecordingError::NothingRecorded { dir: self.to.clone() }) }
     }
 }

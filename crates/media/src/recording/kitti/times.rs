@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use jiff::{civil::DateTime, tz::TimeZone};
+
 use crate::recording::Options;
 use crate::recording::contents::PictureSource;
 use crate::recording::error::{RecordingError, Result};
@@ -65,21 +67,9 @@ pub(super) fn timed_entries(
 /// Parses a date and time such as `2011-09-26 13:02:25.964389445` to nanoseconds after 1970.
 fn parse_date_ns(text: &str) -> Result<u64, LineFault> {
     let parse = || {
-        let (date, time) = text.trim().split_once([' ', 'T'])?;
-        let whole = |text: &str| text.parse::<u64>().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()));
-        let mut date = date.splitn(3, '-').map(whole);
-        let [year, month, day] = [date.next()??, date.next()??, date.next()??];
-        let mut clock = time.splitn(3, ':');
-        let [hours, minutes] = [whole(clock.next()?)?, whole(clock.next()?)?];
-        let seconds: f64 = clock.next()?.parse().ok().filter(|seconds| (0.0..61.0).contains(seconds))?;
-        let is_valid = (1970..2200).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&day);
-        if !is_valid || hours > 23 || minutes > 59 {
-            return None;
-        }
-        // Years that begin in March end with the day that leap years add.
-        let (year, month) = if month < 3 { (year - 1, month + 9) } else { (year, month - 3) };
-        let days = 365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day - 1 - 719_468;
-        Some(((days * 24 + hours) * 60 + minutes) * 60_000_000_000 + (seconds * 1e9).round() as u64)
+        // A day alone is no time.
+        let date: DateTime = text.parse().ok().filter(|_| text.contains(':'))?;
+        u64::try_from(TimeZone::UTC.to_timestamp(date).ok()?.as_nanosecond()).ok()
     };
     parse().ok_or_else(|| LineFault::Date(quote(text)))
 }

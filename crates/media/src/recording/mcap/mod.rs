@@ -121,13 +121,13 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
              --topic, or use --depth none"
         )));
     }
-    let listed = frames.iter().map(|&(time_ns, color_at, depth_at)| ListedFrame {
+    let listed = |&(time_ns, color_at, depth_at): &(u64, usize, Option<usize>)| ListedFrame {
         time_ns: Some(time_ns),
         color: color.source(color_at),
         right: None,
         depth: depth.zip(depth_at).map(|(depth, at)| depth.source(at)),
-    });
-    let listed: Vec<_> = listed.collect();
+    };
+    let listed: Vec<_> = frames.iter().map(listed).collect();
     let given = options.depth_unit.units_per_m().or(options.depth_scale);
     let invalid = options.depth_invalid.filter(|&invalid| invalid != 0);
     let units = DepthUnits { scale: given.unwrap_or(DEPTH_SCALE), invalid };

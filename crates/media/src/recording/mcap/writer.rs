@@ -51,14 +51,6 @@ pub(in crate::recording) struct Writer {
     picture: Vec<u8>,
 }
 
-/// What of a message does not change with its picture: number and time, and width and height.
-#[derive(Clone, Copy)]
-struct Stamp {
-    sequence: u32,
-    time_ns: u64,
-    size: (u32, u32),
-}
-
 impl Writer {
     /// Starts the file `path`.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
@@ -90,9 +82,14 @@ impl Writer {
         })
     }
 
-    /// Writes `self.picture` after `head`, and the camera that took it.
-    fn write_pair(&mut self, [picture, camera]: [u16; 2], stamp: Stamp, format: &str, head: &[u8]) -> Result<()> {
-        let Stamp { sequence, time_ns, size } = stamp;
+    /// Writes `self.picture` of this size after `head`, and the camera that took it.
+    fn write_pair(
+        &mut self,
+        [picture, camera]: [u16; 2],
+        (sequence, time_ns, size): (u32, u64, (u32, u32)),
+        format: &str,
+        head: &[u8],
+    ) -> Result<()> {
         self.message.begin(time_ns, FRAME_ID);
         self.message.text(format);
         self.message.data(&[head, &self.picture]);
@@ -108,10 +105,10 @@ impl Writer {
 impl Storage for Writer {
     fn add(&mut self, number: usize, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<()> {
         let time_ns = FIRST_NS + (time_ns - *self.begin_ns.get_or_insert(time_ns));
-        let stamp = Stamp { sequence: number as u32, time_ns, size: color.size() };
+        let sequence = number as u32;
         self.picture.clear();
         encode::encode_color_png(color, &mut self.picture).map_err(RecordingError::unrecordable(number))?;
-        self.write_pair(self.color, stamp, COLOR_FORMAT, &[])?;
+        self.write_pair(self.color, (sequence, time_ns, color.size()), COLOR_FORMAT, &[])?;
         if let Some(depth) = depth {
             let (file, schemas) = (&mut self.file, self.schemas);
             let channels = *self.depth.get_or_insert_with(|| add_channels(file, schemas, DEPTH, "compressedDepth"));
@@ -125,7 +122,7 @@ impl Storage for Writer {
                 &mut self.picture,
             )
             .map_err(RecordingError::unrecordable(number))?;
-            self.write_pair(channels, Stamp { size: depth.size(), ..stamp }, DEPTH_FORMAT, &COMPRESSED_DEPTH_HEAD)?;
+            self.write_pair(channels, (sequence, time_ns, depth.size()), DEPTH_FORMAT, &COMPRESSED_DEPTH_HEAD)?;
         }
         Ok(())
     }
