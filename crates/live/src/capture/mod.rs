@@ -145,7 +145,7 @@ pub struct SourceInfo {
 }
 
 impl SourceInfo {
-    /// Returns whether a run that has delivered so many frames is complete, though its source, a live one, does not end.
+    /// Returns whether a run that has delivered this number of frames is complete, though its source, a live one, does not end.
     pub fn is_complete(&self, delivered: u64) -> bool {
         self.live && self.frames.is_some_and(|frames| delivered >= frames)
     }
