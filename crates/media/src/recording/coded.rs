@@ -12,6 +12,7 @@ use std::path::Path;
 use image::codecs::{gif::GifDecoder, pnm::PnmDecoder, webp::WebPDecoder};
 use image::metadata::Orientation;
 use image::{AnimationDecoder, ColorType, ImageDecoder, ImageFormat};
+use tiff::tags::Tag;
 
 use super::color_space;
 use super::decoders::{
@@ -274,8 +275,8 @@ pub(super) fn read_stored_orientation(path: &Path) -> Option<Orientation> {
     read_orientation(path).ok().filter(|_| !is_converted)
 }
 
-/// Returns whether a file has several pictures, which are shown one after another.
-pub(super) fn is_animated(path: &Path) -> bool {
+/// Returns whether a file has several pictures: of an animation, or pages.
+pub(super) fn has_more_pictures(path: &Path) -> bool {
     let count = || -> Option<bool> {
         let (file, kind) = open_detected(path).ok()?;
         let reader = BufReader::new(file);
@@ -286,6 +287,12 @@ pub(super) fn is_animated(path: &Path) -> bool {
             FileKind::Other(ImageFormat::WebP) => WebPDecoder::new(reader).ok()?.has_animation(),
             FileKind::Other(ImageFormat::Gif) => {
                 GifDecoder::new(reader).ok()?.into_frames().take(2).flatten().count() > 1
+            }
+            FileKind::Other(ImageFormat::Tiff) => {
+                let mut tiff = tiff::decoder::Decoder::new(reader).ok()?;
+                tiff.next_image().ok()?;
+                // Neither a thumbnail nor a mask of the first.
+                tiff.find_tag_unsigned(Tag::NewSubfileType).ok()?.unwrap_or(0_u32) & 0b101 == 0
             }
             _ => false,
         })

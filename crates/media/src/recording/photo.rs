@@ -43,9 +43,8 @@ impl Photo {
         let decoded = EncodedPicture::open(path, &mut file).and_then(Self::decode);
         let mut photo = decoded.map_err(RecordingError::picture(path))?;
         drop(file);
-        photo
-            .notes
-            .extend(coded::is_animated(path).then_some("is animated: its first picture is used; `stream` plays a GIF"));
+        let first = "has several pictures, of which the first is used; `stream` plays a GIF";
+        photo.notes.extend(coded::has_more_pictures(path).then_some(first));
         let orientation = photo.metadata.take_orientation();
         photo.transform(&upright(orientation));
         Ok(photo)

@@ -181,6 +181,23 @@ fn the_name_of_what_is_read_counts_before_that_of_its_file_and_folder() {
     assert!(file.map.metres[7] < file.map.metres[0], "large is near");
 }
 
+#[test]
+fn a_file_of_several_pictures_says_that_the_first_is_used() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("pages.tif");
+    for (kinds, is_said) in [(&[0_u32][..], false), (&[0, 0], true), (&[0, 1], false), (&[0, 4], false)] {
+        let mut encoder = tiff::encoder::TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
+        for &kind in kinds {
+            let mut page = encoder.new_image::<tiff::encoder::colortype::RGB8>(4, 2).unwrap();
+            page.encoder().write_tag(tiff::tags::Tag::NewSubfileType, kind).unwrap();
+            page.write_data(&[9; 24]).unwrap();
+        }
+        drop(encoder);
+        let notes = Photo::read(&path).unwrap().notes;
+        assert_eq!(notes.iter().any(|note| note.contains("has several pictures")), is_said, "{kinds:?}: {notes:?}");
+    }
+}
+
 /// EXIF with one entry, or with a chain of directories to the mark of Adobe RGB.
 fn exif_of(orientation: Option<u16>) -> Vec<u8> {
     let directory = |tag: u16, kind: u16, count: u32, value: [u8; 4]| {
