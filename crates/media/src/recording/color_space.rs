@@ -69,8 +69,12 @@ pub(super) fn of_png(info: &png::Info) -> Option<Vec<u8>> {
 
 /// Returns the chunks of a PNG that state its colours other than by a profile, and its print size, to be written again.
 pub(super) fn chunks_of_png(info: &png::Info) -> Vec<([u8; 4], Vec<u8>)> {
-    let gamma = info.gama_chunk.map(|gamma| (png::chunk::gAMA, gamma.into_scaled().to_be_bytes().to_vec()));
-    let primaries = info.chrm_chunk.map(|primaries| (png::chunk::cHRM, primaries.to_be_bytes().to_vec()));
+    // A profile and sRGB have priority over these two.
+    let counts = info.icc_profile.is_none() && info.srgb.is_none();
+    let gamma =
+        info.gama_chunk.filter(|_| counts).map(|gamma| (png::chunk::gAMA, gamma.into_scaled().to_be_bytes().to_vec()));
+    let primaries =
+        info.chrm_chunk.filter(|_| counts).map(|primaries| (png::chunk::cHRM, primaries.to_be_bytes().to_vec()));
     let points = info.coding_independent_code_points.map(|points| {
         let range = u8::from(points.is_video_full_range_image);
         (png::chunk::cICP, vec![points.color_primaries, points.transfer_function, points.matrix_coefficients, range])
@@ -244,6 +248,6 @@ mod tests {
         });
         let pq = read_tone_curves(&of_png(&info).unwrap()).unwrap();
         assert!(pq.0[0].decode(32768) < 0.02, "half of PQ's codes are 92 of 10000 cd/m2");
-        assert_eq!(chunks_of_png(&info).len(), 2);
+        assert_eq!(chunks_of_png(&info).len(), 1, "gamma counts for nothing");
     }
 }

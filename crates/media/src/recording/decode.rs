@@ -131,8 +131,10 @@ pub(super) fn decode_color(
 ) -> Result<PhotoMetadata, PictureFault> {
     expected.map_or(Ok(()), |expected| check_color_size(coded.size(), expected))?;
     let mut metadata = decode_stored_color(coded, pixels, into)?;
-    // The profile no longer applies to what it has converted.
-    metadata.icc_profile.take_if(|profile| color_space::convert_to_srgb(profile, &mut into.rgb));
+    // What states colours no longer applies to what it has converted.
+    if metadata.icc_profile.take_if(|profile| color_space::convert_to_srgb(profile, &mut into.rgb)).is_some() {
+        metadata.png_chunks.retain(|(name, _)| !color_space::is_color_chunk(*name));
+    }
     Ok(metadata)
 }
 

@@ -235,16 +235,43 @@ fn a_tag_behind_the_pixels_turns_a_picture_in_a_folder_too() {
     let scene = Scene::new();
     ["rgb", "depth"].iter().for_each(|folder| fs::remove_dir(scene.path(folder)).unwrap());
     scene.color("1.png", MAP_PX, 9);
-    let exif = exif_of(Some(6));
-    let chunk = [&b"eXIf"[..], &exif].concat();
-    let length = (exif.len() as u32).to_be_bytes();
-    let whole = [&length[..], &chunk, &crc(&chunk).to_be_bytes()].concat();
-    let mut file = fs::read(scene.path("1.png")).unwrap();
-    let end = file.len() - 12;
-    file.splice(end..end, whole);
-    fs::write(scene.path("1.png"), file).unwrap();
+    let before_end = fs::read(scene.path("1.png")).unwrap().len() - 12;
+    insert_chunk(&scene.path("1.png"), before_end, b"eXIf", &exif_of(Some(6)));
     assert_eq!(Photo::read(&scene.path("1.png")).unwrap().color.size(), (2, 4));
     assert_eq!(scene.open().unwrap().size(), (2, 4));
+}
+
+/// Inserts a chunk into a PNG.
+fn insert_chunk(path: &Path, at: usize, name: &[u8; 4], data: &[u8]) {
+    let chunk = [&name[..], data].concat();
+    let whole = [&(data.len() as u32).to_be_bytes()[..], &chunk, &crc(&chunk).to_be_bytes()].concat();
+    let mut file = fs::read(path).unwrap();
+    file.splice(at..at, whole);
+    fs::write(path, file).unwrap();
+}
+
+#[test]
+fn a_profile_has_priority_over_a_gamma_beside_it_in_the_result_too() {
+    let dir = TempDir::new().unwrap();
+    let [path, again] = ["a.png", "again.png"].map(|name| dir.path().join(name));
+    let mut picture = bokehcam::frame::ColorImage::new(8, 8);
+    picture.rgb.as_chunks_mut::<3>().0.fill([99, 175, 75]);
+    let profile = moxcms::ColorProfile::new_adobe_rgb().encode().unwrap();
+    write_photo(&path, &picture, &PhotoMetadata { icc_profile: Some(profile), ..PhotoMetadata::default() }, true)
+        .unwrap();
+    // After the header, as ImageMagick writes it whatever the profile is.
+    insert_chunk(&path, 33, b"gAMA", &45_455_u32.to_be_bytes());
+    Photo::read(&path).unwrap().write(&again, true).unwrap();
+    for path in [&path, &again] {
+        let color = read_color(path).unwrap();
+        assert!(color.rgb[..3].iter().zip([0, 177, 64]).all(|(a, b)| a.abs_diff(b) <= 3), "{:?}", &color.rgb[..3]);
+    }
+    // Colours that are converted are stated no more.
+    write_photo(&path, &picture, &PhotoMetadata::default(), true).unwrap();
+    insert_chunk(&path, 33, b"gAMA", &100_000_u32.to_be_bytes());
+    let (shown, metadata) = bokehcam_media::recording::still::read_photo(&path).unwrap();
+    write_photo(&again, &shown, &metadata, true).unwrap();
+    assert!(shown != picture && read_color(&again).unwrap() == shown);
 }
 
 /// The checksum of a PNG's chunk.
