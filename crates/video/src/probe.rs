@@ -188,9 +188,8 @@ impl Stream {
 
     /// Returns whether the pixel format has an alpha channel, or a palette, of which one colour may be transparent.
     fn has_alpha(&self) -> bool {
-        const NAMES: [&str; 8] = ["yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ayuv", "pal8"];
-        let is_grey_alpha = |name: &str| matches!(name, "ya8" | "ya16le" | "ya16be");
-        let is_stated = |name: &str| is_grey_alpha(name) || NAMES.iter().any(|alpha| name.contains(alpha));
+        const NAMES: [&str; 10] = ["yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ayuv", "pal8", "ya8", "ya16"];
+        let is_stated = |name: &str| NAMES.iter().any(|alpha| name.contains(alpha));
         self.pix_fmt.as_deref().is_some_and(is_stated) || self.alpha_decoder().is_some()
     }
 
@@ -295,12 +294,9 @@ fn parse_seconds(text: &Option<String>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn ratio(text: &str) -> Option<f64> {
-        parse_ratio(&Some(text.to_owned()), '/')
-    }
-
     #[test]
     fn ratios_are_positive_numbers_or_none() {
+        let ratio = |text: &str| parse_ratio(&Some(text.to_owned()), '/');
         assert_eq!([ratio("25/1"), ratio("1/2"), ratio("3/4")], [Some(25.0), Some(0.5), Some(0.75)]);
         for text in ["0/0", "1/0", "0/1", "-25/1", "25", "a/b", "", "1/1e-30", "NaN/1"] {
             assert_eq!(ratio(text), None, "{text}");
