@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::replay::PlayRange;
-use super::video::Video;
+use super::video::{Video, warn_of_remarks};
 use super::{Camera, CaptureError, Captured, FrameBuffers};
 use bokehcam::depth::backdrop::{BackgroundVideo, cover_size};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
@@ -31,7 +31,7 @@ impl BackgroundFile {
     /// The file is missing, not a video, or has no picture that can be decoded; ffmpeg is missing.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let file = VideoFile::open(path)?;
-        file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", path.display()));
+        warn_of_remarks(&file);
         let scale = (f64::from(MAX_FIRST_PX) / f64::from(file.size_px.0.max(file.size_px.1))).min(1.0);
         let [width, height] =
             [file.size_px.0, file.size_px.1].map(|side| ((f64::from(side) * scale).round() as u32).max(1));

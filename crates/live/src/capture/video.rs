@@ -14,6 +14,11 @@ const MAX_SEEK_FRAMES: u64 = 5 << 20;
 /// How long before the end of a lap the decoder of the next one starts, in seconds.
 const LAP_STARTUP_S: f64 = 1.0;
 
+/// Says what was chosen about a video, or is not shown as it should be.
+pub fn warn_of_remarks(file: &VideoFile) {
+    file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", file.path.display()));
+}
+
 /// Plays a video file in frame order; a lap of a loop is a new run of the decoder.
 pub struct Video {
     file: VideoFile,

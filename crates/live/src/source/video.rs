@@ -6,7 +6,7 @@ use std::path::Path;
 use super::{Frames, SourceError, SourceName, options};
 use crate::capture::CaptureError;
 use crate::capture::replay::PlayRange;
-use crate::capture::video::Video;
+use crate::capture::video::{Video, warn_of_remarks};
 use crate::depth::video::VideoDepth;
 use crate::sink::Sound;
 use bokehcam::depth::DepthError;
@@ -68,11 +68,6 @@ pub(super) fn parse(path: &Path) -> Option<Result<SourceName, SourceError>> {
         )));
     }
     (path.is_file() && is_video(path)).then(|| Ok(SourceName::Video(path.to_owned())))
-}
-
-/// Says what was chosen about a video, or is not shown as it should be.
-fn warn_of_remarks(file: &VideoFile) {
-    file.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", file.path.display()));
 }
 
 /// Opens a video file. `by_index` counts frames from the first one of the file, also after `--start`.
