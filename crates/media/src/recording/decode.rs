@@ -233,9 +233,10 @@ pub(super) fn decode_depth(
 }
 
 impl DepthUnits {
-    /// Returns the units of codes that are multiplied.
+    /// Returns the units of codes that are multiplied, and none of which is above 65535 then.
     fn scaled(self, factor: f32) -> Self {
-        let invalid = self.invalid.map(|code| (f32::from(code) * factor).round() as u16);
+        let invalid = self.invalid.map(|code| (f32::from(code) * factor).round());
+        let invalid = invalid.filter(|&code| code <= f32::from(u16::MAX)).map(|code| code as u16);
         Self { scale: self.scale * factor, invalid }
     }
 

@@ -45,7 +45,6 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Re
     } else if values.role == Role::InverseDepth {
         values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
     } else if matches!(values.samples, Samples::Sixteen | Samples::Whole)
-        && options.unit.is_none()
         && options.scale.is_none()
         && let Some((per_m, invalid, note)) = scale_beside(path, values.samples == Samples::Sixteen)?
     {

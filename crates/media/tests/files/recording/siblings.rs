@@ -15,7 +15,7 @@ use super::{Scene, assert_says, depth_of};
 
 /// Size of the maps here, and whole numbers in them.
 const MAP_PX: (u32, u32) = (4, 2);
-const CODES: [u16; 8] = [1000, 1200, 1400, 1600, 1800, 2000, 2200, 4000];
+const CODES: [u16; 8] = [1000, 1200, 1400, 1600, 1800, 2000, 2200, 4095];
 
 /// A recording of one picture in `color` and one map in `depth`.
 fn pair(map: &str) -> (Scene, std::path::PathBuf) {
