@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bokehcam::frame::ColorImage;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
-    ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, Window as Id,
+    ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, MapState, Window as Id,
 };
 
 use super::picture;
@@ -56,11 +56,19 @@ impl<'a> Window<'a> {
         self.screen.x.flush().unwrap();
     }
 
-    /// Minimises the window.
+    /// Minimises the window, and waits until it is off the screen.
     pub fn minimise(&self) {
         const ICONIC: u32 = 3;
         self.screen.ask_manager(self.id, "WM_CHANGE_STATE", [ICONIC, 0, 0, 0, 0]);
-        until("the window is put away", PATIENCE, || self.has_state("_NET_WM_STATE_HIDDEN"));
+        // Openbox states it before the window is unmapped.
+        until("the window is put away", PATIENCE, || {
+            self.has_state("_NET_WM_STATE_HIDDEN") && !self.is_on_the_screen()
+        });
+    }
+
+    fn is_on_the_screen(&self) -> bool {
+        let attributes = self.screen.x.get_window_attributes(self.id).unwrap().reply().unwrap();
+        attributes.map_state == MapState::VIEWABLE
     }
 
     /// Restores and raises the window.
