@@ -1,8 +1,9 @@
 //! Isochronous transfers of USB webcams: bandwidth that is reserved, or lacks, and packets that are lost.
 
 use bokehcam_live::v4l2::FourCc;
+use rustix::process::Signal;
 
-use super::machine::{frame_now, open, run, until, wish};
+use super::machine::{HANG, beside, bokehcam, frame_now, open, run, until, wish};
 use super::webcam::{ISOCHRONOUS, NAME, SIZE, Webcam, read};
 
 #[test]
@@ -58,4 +59,12 @@ fn a_bus_without_bandwidth_is_told_with_a_way_out() {
     });
     webcam.say("bandwidth 1024");
     read(&mut camera, 5, SIZE);
+    drop(camera);
+    // It takes the bandwidth while this one stalls: starting the stream again is refused, then opening it.
+    let program = beside(bokehcam(&stream("--size 320x240 --format YUYV")));
+    webcam.line_with("stream YUYV 320x240");
+    ["bandwidth 100", "stall"].map(|command| webcam.say(command));
+    (0..2).for_each(|_| drop(webcam.line_with("no bandwidth")));
+    let said = program.end_by(Signal::INT, HANG).stderr;
+    assert!(said.contains(told) && !said.contains("STREAMON"), "{said}");
 }

@@ -43,8 +43,9 @@ impl LiveDevice {
                     if error::is_gone(&error) {
                         self.handle_error(&error);
                     } else {
+                        let reason = self.explain(&OpenError::from_queue(self.identity.node(), error));
                         let remedy = self.watchdog.escalate(now_ns);
-                        self.apply_remedy(remedy, &error.to_string());
+                        self.apply_remedy(remedy, &reason);
                     }
                 }
             }
@@ -88,10 +89,16 @@ impl LiveDevice {
                     Remedy::Reopen(pause) => pause.as_nanos() as u64,
                     Remedy::Restart | Remedy::Wait => 0,
                 };
-                self.warn_once(format!("{error}; trying again"));
+                self.warn_once(format!("{}; trying again", self.explain(&error)));
                 self.state = State::Reconnecting { retry_ns: now_ns + pause.max(RETRY_NS) };
             }
         }
+    }
+
+    /// Returns what `error` says without the node, which every warning names.
+    fn explain(&self, error: &OpenError) -> String {
+        let (said, node) = (error.to_string(), format!("{}: ", self.identity.node().display()));
+        said.strip_prefix(&node).unwrap_or(&said).to_owned()
     }
 
     /// Opens the device again. One that came back without the requested format is taken with the nearest one, as waiting
