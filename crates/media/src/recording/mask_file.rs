@@ -83,7 +83,8 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
     let mut alphas = if samples.has_alpha() { vec![1.0; pixels] } else { Vec::new() };
     let (mut lowest, mut highest, mut brightest) = (1.0_f32, 0.0_f32, 0.0_f32);
     let (mut unequal, mut colored) = (0, 0);
-    let white = samples.white();
+    // The decoder of PNM scales numbers: those of objects are the ones before.
+    let white = coded::read_pnm_white(path).filter(|&white| white > 1.0).unwrap_or(samples.white());
     let is_jpeg = coded::read_kind(path) == Some(FileKind::Jpeg);
     let mut metadata = luma::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
         let LumaPixel { luma, alpha, is_colored } = pixel;
