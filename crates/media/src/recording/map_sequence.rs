@@ -69,14 +69,14 @@ impl MapSequence {
         let (mut options, mut notes) = (options, Vec::new());
         // One scale for all, read once.
         let is_open = options.scale.is_none() && options.unit.is_none() && !options.invert;
-        if let Some((scale, invalid, note)) = files
+        if let Some(units) = files
             .first()
             .filter(|_| is_open)
             .map_or(Ok(None), |file| depth_file::find_scale(file).map_err(RecordingError::picture(file)))?
         {
-            (options.scale, options.invalid) =
-                (Some(scale), options.invalid.filter(|&invalid| invalid != 0.0).or(invalid));
-            notes.push(note);
+            options.scale = Some(units.per_m);
+            options.invalid = options.invalid.filter(|&invalid| invalid != 0.0).or(units.invalid.map(f32::from));
+            notes.push(units.describe());
         }
         let samples = || files.iter().step_by(files.len().div_ceil(RANGE_SAMPLES).max(1));
         let mut fault = None;

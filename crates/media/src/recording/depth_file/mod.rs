@@ -26,6 +26,7 @@ pub use values::has_colors;
 use super::coded::{self, EncodedPicture};
 use super::decoders::guard;
 use super::fault::{PictureFault, open_fault};
+use super::rgbd::StatedUnits;
 use super::{MAX_PIXELS, RecordingError, pfm};
 use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam_files::input;
@@ -174,14 +175,14 @@ fn read_codes(path: &Path) -> Result<Values, PictureFault> {
     Ok(Values { stated: stated::read_text(path), ..values }.turned(metadata.take_orientation()))
 }
 
-/// Returns the units per metre that are stated beside the map `path`, the number that means unknown there, and a sentence
-/// about both; `None` if there are none, or the map has no need of them.
+/// Returns the units that are stated beside the map `path` for all maps there; `None` if there are none, or the map has no
+/// need of them.
 ///
 /// # Errors
 /// What states them is faulty.
-pub(super) fn find_scale(path: &Path) -> Result<Option<(f32, Option<f32>, String)>, PictureFault> {
+pub(super) fn find_scale(path: &Path) -> Result<Option<StatedUnits>, PictureFault> {
     match read_numbers(path).ok().filter(|values| values.stated.is_none()).map(|values| values.samples) {
-        Some(samples @ (Samples::Sixteen | Samples::Whole)) => stated::scale_beside(path, samples == Samples::Sixteen),
+        Some(samples @ (Samples::Sixteen | Samples::Whole)) => stated::scale_beside(path, samples, None),
         _ => Ok(None),
     }
 }

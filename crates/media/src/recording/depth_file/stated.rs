@@ -8,7 +8,7 @@ use crate::recording::coded;
 use crate::recording::fault::PictureFault;
 use crate::recording::geometry::Geometry;
 use crate::recording::middlebury;
-use crate::recording::rgbd::Scale;
+use crate::recording::rgbd::{Scale, StatedUnits};
 use crate::recording::role::Role;
 use crate::recording::unit::{KEYWORD, MapUnit};
 
@@ -46,10 +46,11 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Re
         values.notes.push("holds inverse depth by its name; --depth-unit says what else it is".to_owned());
     } else if matches!(values.samples, Samples::Sixteen | Samples::Whole)
         && options.scale.is_none()
-        && let Some((per_m, invalid, note)) = scale_beside(path, values.samples == Samples::Sixteen)?
+        && let Some(units) = scale_beside(path, values.samples, Some(path))?
     {
-        (values.stated, values.invalid) = (Some(MapUnit::Depth { per_m }), invalid);
-        values.notes.push(note);
+        values.stated = Some(MapUnit::Depth { per_m: units.per_m });
+        values.invalid = units.invalid.map(f32::from);
+        values.notes.push(units.describe());
     }
     Ok(values)
 }
@@ -61,19 +62,18 @@ fn role_of(path: &Path) -> Role {
     Role::of_name(if stem.contains(char::is_alphabetic) { &stem } else { &folder })
 }
 
-/// Returns the units per metre of whole numbers like those of this map: a file of its recording or beside its picture states
-/// them, or they are those of the kind of recording, if `may_assume` allows that. Also returns the number that means unknown,
-/// and a sentence about both; `None` if the map belongs to nothing.
+/// Returns the units of whole numbers like those of this map: a file of its recording or beside its picture states them, or
+/// they are those of the kind of recording, where that may be assumed; those for the map `only`, or for all of the recording.
+/// `None` if the map belongs to nothing.
 ///
 /// # Errors
-/// The file is faulty.
-pub(in crate::recording) fn scale_beside(
+/// The file is faulty, or states several scales for all.
+pub(super) fn scale_beside(
     path: &Path,
-    may_assume: bool,
-) -> Result<Option<(f32, Option<f32>, String)>, PictureFault> {
+    samples: Samples,
+    only: Option<&Path>,
+) -> Result<Option<StatedUnits>, PictureFault> {
     let Some(scale) = Scale::of_map(path) else { return Ok(None) };
-    let stated = scale.read().map_err(|error| PictureFault::Scale(Box::new(error)))?;
-    let note = format!("has {} units per metre ({}; --depth-scale)", stated.per_m, stated.origin);
-    let found = (stated.per_m, stated.invalid.map(f32::from), note);
-    Ok(Some(found).filter(|_| may_assume || !stated.are_assumed))
+    let stated = scale.read(only).map_err(|error| PictureFault::Scale(Box::new(error)))?;
+    Ok(Some(stated).filter(|stated| samples == Samples::Sixteen || !stated.are_assumed))
 }

@@ -14,7 +14,7 @@ use super::error::RecordingError;
 use super::folder::{Pictures, pair_by_name};
 use super::{DepthUnit, Options, Unpaired, timeline};
 use bokehcam_files::folder::has_file_list;
-pub(super) use scale::Scale;
+pub(super) use scale::{Scale, StatedUnits};
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "RGB-D folders",
@@ -118,7 +118,7 @@ fn depth_format(scale: Scale, options: &Options) -> Result<(DepthFormat, String)
             (format, format!("depth has {scale} units per metre, as requested"))
         }
         (_, None) => {
-            let stated = scale.read()?;
+            let stated = scale.read(None)?;
             // 0 is unknown anyway: it states nothing.
             let invalid = options.depth_invalid.filter(|&value| value != 0).or(stated.invalid);
             let units = DepthUnits { scale: stated.per_m, invalid };

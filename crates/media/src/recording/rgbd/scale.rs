@@ -45,6 +45,11 @@ impl StatedUnits {
     fn millimetres(origin: &str) -> Self {
         Self { per_m: 1000.0, invalid: Some(u16::MAX), are_assumed: true, origin: origin.to_owned() }
     }
+
+    /// Returns a sentence about them, and the option that overrides them.
+    pub(in crate::recording) fn describe(&self) -> String {
+        format!("has {} units per metre ({}; --depth-scale)", self.per_m, self.origin)
+    }
 }
 
 /// The scales of Instant NGP and SplaTAM, and of Nerfstudio.
@@ -101,11 +106,11 @@ impl Scale {
         })
     }
 
-    /// Reads the file, if there is one.
+    /// Reads the file, if there is one: for `map` alone, or for all maps.
     ///
     /// # Errors
-    /// It is unreadable, or states no scale > 0; or that of its pictures differs.
-    pub(in crate::recording) fn read(&self) -> Result<StatedUnits, RecordingError> {
+    /// It is unreadable, or states no scale > 0; or that of its pictures differs, and it states none for `map`.
+    pub(in crate::recording) fn read(&self, map: Option<&Path>) -> Result<StatedUnits, RecordingError> {
         match self {
             Self::Millimetres => Ok(StatedUnits::millimetres("assumed to be millimetres, 65535 unknown")),
             Self::Transforms(file) => match read_json::<Transforms>(file)?.metres() {
@@ -123,6 +128,10 @@ impl Scale {
             }
             Self::Bop(file) => {
                 let cameras: BTreeMap<String, BopCamera> = read_json(file)?;
+                let number = map.and_then(|map| map.file_stem()?.to_str()?.parse::<u64>().ok());
+                if let Some(camera) = number.and_then(|number| cameras.get(&number.to_string())) {
+                    return to_units(file, 1000.0 / camera.depth_scale);
+                }
                 let fault = |what: String| RecordingError::StatedScale { file: file.clone(), what };
                 let mut scales = cameras.iter().map(|(picture, camera)| (picture, camera.depth_scale));
                 let (first, scale) = scales.next().ok_or_else(|| fault("names no picture".to_owned()))?;

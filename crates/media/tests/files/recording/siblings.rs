@@ -138,8 +138,8 @@ fn a_faulty_scale_is_refused_for_one_map_as_for_a_recording() {
     ImageBuffer::<Luma<u16>, _>::from_raw(4, 2, CODES.to_vec()).unwrap().save(&path).unwrap();
     for (text, says) in [
         (
-            r#"{"1": {"depth_scale": 0.1}, "2": {"depth_scale": 0.2}}"#,
-            "depth_scale is 0.1 for picture 1, but 0.2 for 2",
+            r#"{"2": {"depth_scale": 0.1}, "3": {"depth_scale": 0.2}}"#,
+            "depth_scale is 0.1 for picture 2, but 0.2 for 3",
         ),
         (r#"{"1": {"depth_scale": 0}}"#, "not a scale > 0"),
         ("{", "scene_camera.json"),
@@ -153,6 +153,9 @@ fn a_faulty_scale_is_refused_for_one_map_as_for_a_recording() {
         let given = Options { scale: Some(1000.0), ..Options::default() };
         assert_eq!(metres(&path, given)[0], 1.0, "an option has priority");
     }
+    scene.write("scene_camera.json", r#"{"1": {"depth_scale": 0.1}, "2": {"depth_scale": 0.2}}"#);
+    assert_eq!(metres(&path, Options::default())[0], 0.1, "its own");
+    assert_says(scene.open(), &["all need one"]);
 }
 
 #[test]
