@@ -39,7 +39,8 @@ fn pictures_with_lost_packets_are_counted_and_never_shown() {
 fn a_bus_without_bandwidth_is_told_with_a_way_out() {
     let formats = ["--formats", "mjpeg:320x240:640x480,yuyv:320x240:640x480"];
     let mut webcam = Webcam::plug(&[&[ISOCHRONOUS, "--bandwidth", "1024"], &formats[..]].concat());
-    let stream = |mode: &str| format!("stream {} --effect none --to null {mode}", webcam.node);
+    let node = webcam.node.clone();
+    let stream = |mode: &str| format!("stream {node} --effect none --to null {mode}");
     let told = "not enough USB bandwidth to start; choose --format MJPG, a smaller --size or a lower --fps, or plug the camera";
     run(&stream("--size 640x480 --format YUYV --frames 5")).refused(1, &[told]);
     webcam.line_with("no bandwidth for 2048 bytes");
