@@ -89,6 +89,7 @@ struct Stream {
     sample_aspect_ratio: Option<String>,
     color_space: Option<String>,
     color_transfer: Option<String>,
+    color_primaries: Option<String>,
     avg_frame_rate: Option<String>,
     r_frame_rate: Option<String>,
     nb_frames: Option<String>,
@@ -209,11 +210,15 @@ impl Stream {
         let choice = (tracks > 1).then(|| format!("has {tracks} tracks of pictures, of which {by} is played"));
         let curve = self.color_transfer.as_deref().filter(|curve| matches!(*curve, "smpte2084" | "arib-std-b67"));
         let curve = curve.map(|curve| format!("high dynamic range ({curve}) is shown without tone mapping"));
+        let is_wide = |name: &&str| matches!(*name, "smpte431" | "smpte432" | "bt2020");
+        let primaries = self.color_primaries.as_deref().filter(is_wide).filter(|_| curve.is_none());
+        let primaries =
+            primaries.map(|name| format!("colours of {name} are shown as those of BT.709, so a little paler"));
         let is_interlaced = matches!(self.field_order.as_deref(), Some("tt" | "bb" | "tb" | "bt"));
         let fields = is_interlaced.then(|| {
             "interlaced pictures are shown as they are; deinterlace them before: ffmpeg -i IN -vf yadif OUT".to_owned()
         });
-        [choice, curve, fields].into_iter().flatten().collect()
+        [choice, curve, primaries, fields].into_iter().flatten().collect()
     }
 
     /// Returns the size of a stream of `width` x `height` stored pixels on a screen.
@@ -236,7 +241,7 @@ fn probe_command(path: &Path) -> Command {
         .args(["-of", "json", "-show_entries"])
         .arg(
             "stream=index,codec_type,codec_name,pix_fmt,field_order,time_base,start_pts,width,height,sample_aspect_ratio,color_space,\
-             color_transfer,avg_frame_rate,r_frame_rate,nb_frames,start_time,duration:\
+             color_transfer,color_primaries,avg_frame_rate,r_frame_rate,nb_frames,start_time,duration:\
              stream_disposition=default,attached_pic:stream_tags=alpha_mode:stream_side_data=rotation:format=format_name,start_time,duration:\
              format_tags=title,artist,date,creation_time,location,comment,description",
         )

@@ -64,7 +64,7 @@ fn a_bus_without_bandwidth_is_told_with_a_way_out() {
     // It takes the bandwidth while this one stalls: starting the stream again is refused, then opening it.
     let program = beside(bokehcam(&stream("--size 320x240 --format YUYV")));
     webcam.line_with("stream YUYV 320x240");
-    ["bandwidth 100", "stall"].map(|command| webcam.say(command));
+    ["bandwidth 100", "stall"].iter().for_each(|command| webcam.say(command));
     (0..2).for_each(|_| drop(webcam.line_with("no bandwidth")));
     let said = program.end_by(Signal::INT, HANG).stderr;
     assert!(said.contains(told) && !said.contains("STREAMON"), "{said}");

@@ -7,6 +7,9 @@ use std::path::Path;
 use super::MAX_ENTRIES;
 use super::error::{RecordingError, Result};
 
+/// Least number of digits of seconds since 1970 in names.
+const SECONDS_DIGITS: usize = 9;
+
 /// Endings of pictures.
 pub(super) const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "ppm", "pgm"];
 
@@ -19,6 +22,12 @@ fn split_name(name: &str) -> Option<(&str, &str)> {
 fn split_known<'a>(name: &'a str, endings: &[&str]) -> Option<(&'a str, &'a str)> {
     let is_known = |ending: &str| endings.iter().any(|known| ending.eq_ignore_ascii_case(known));
     name.rsplit_once('.').filter(|(stem, ending)| !stem.is_empty() && !stem.starts_with('.') && is_known(ending))
+}
+
+/// Returns a stem without a suffix, in whichever case that is written.
+pub(super) fn strip_suffix<'a>(stem: &'a str, suffix: &str) -> Option<&'a str> {
+    let (start, end) = stem.split_at_checked(stem.len().checked_sub(suffix.len())?)?;
+    end.eq_ignore_ascii_case(suffix).then_some(start)
 }
 
 /// Returns the names of the PNG, JPEG and PNM files in `folder` whose stems are `wanted`, in natural order (2 before 10).
@@ -70,15 +79,20 @@ pub(super) fn find_numbered_pictures(folder: &Path) -> Result<Vec<String>> {
     if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
 }
 
-/// Returns a text that sorts like `name` with its numbers compared by value: each has its length in front.
+/// Returns a text that sorts like `name` with its numbers compared by value: each has its length in front, but for the
+/// decimals of seconds since 1970.
 fn natural_key(name: &str) -> String {
     let mut key = String::with_capacity(name.len() + 3);
+    let mut before = ["", ""];
     for run in split_digits(name) {
         let number = run.trim_start_matches('0');
+        let are_decimals = before[0].len() >= SECONDS_DIGITS && before[1] == ".";
         match run.starts_with(|c: char| c.is_ascii_digit()) {
+            true if are_decimals => key.push_str(run),
             true => key.extend([&format!("{:03}", number.len()), number]),
             false => key.push_str(&run.to_lowercase()),
         }
+        before = [before[1], run];
     }
     key
 }
@@ -118,7 +132,7 @@ impl<'a> Pictures<'a> {
 
     /// Returns the part of a stem between prefix and suffix; `None` for another kind of picture.
     fn middle<'b>(&self, stem: &'b str) -> Option<&'b str> {
-        let middle = stem.strip_prefix(self.prefix)?.strip_suffix(self.suffix)?;
+        let middle = strip_suffix(stem.strip_prefix(self.prefix)?, self.suffix)?;
         let is_number = || !middle.is_empty() && middle.bytes().all(|byte| byte.is_ascii_digit());
         (self.is_any || is_number()).then_some(middle)
     }
@@ -259,6 +273,10 @@ mod tests {
         assert_eq!(sorted(&["IMG_10.jpg", "img_9.jpg", "IMG_011.jpg"]), ["img_9.jpg", "IMG_10.jpg", "IMG_011.jpg"]);
         assert_eq!(sorted(&["b1", "a2", "a1x2", "a1x10", "é3"]), ["a1x2", "a1x10", "a2", "b1", "é3"]);
         assert_eq!(sorted(&["000001_10", "000000_11", "000000_10"]), ["000000_10", "000000_11", "000001_10"]);
+        // As Python writes them, without zeros at the end.
+        let times = ["1700000000.png", "1700000000.05.png", "1700000000.1.png", "1700000000.15.png", "1700000001.png"];
+        assert_eq!(sorted(&[times[3], times[1], times[4], times[2], times[0]])[1..4], times[1..4]);
+        assert_eq!(sorted(&["1.10", "1.9"]), ["1.9", "1.10"]);
         let long = "9".repeat(250);
         assert_eq!(sorted(&[&long, "10"]), ["10", &long]);
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::depth_file::{self, DepthFile, Distances};
 use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
-use super::folder::{Ambiguous, PairKey, find_files, has_files, pair_stems};
+use super::folder::{Ambiguous, PairKey, find_files, has_files, pair_stems, strip_suffix};
 use super::{LAYOUTS, pictures};
 
 /// Number of maps, spread over the sequence, whose numbers decide the range of relative depth.
@@ -192,7 +192,7 @@ fn fill_gaps(names: &[String]) -> Vec<String> {
 fn pair_by_stem(dir: &Path, names: &[String], stems: &[String]) -> Result<Option<(Vec<String>, PairKey)>> {
     let stem = |name: &'_ String| -> String {
         let stem = name.rsplit_once('.').map_or(&**name, |(stem, _)| stem);
-        pictures::MAP_SUFFIXES.iter().find_map(|suffix| stem.strip_suffix(suffix)).unwrap_or(stem).to_owned()
+        pictures::MAP_SUFFIXES.iter().find_map(|suffix| strip_suffix(stem, suffix)).unwrap_or(stem).to_owned()
     };
     let maps: Vec<String> = names.iter().map(stem).collect();
     let [pictured, maps] = [stems, &maps].map(|stems| stems.iter().map(String::as_str).collect::<Vec<_>>());

@@ -18,7 +18,7 @@ use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
 
 /// Suffixes of the masks of pictures, after the picture's stem.
-const SUFFIXES: [&str; 2] = ["-mask", ".mask"];
+const SUFFIXES: [&str; 3] = ["-mask", ".mask", "_mask"];
 
 /// Largest code of a mask that numbers objects: far darker than any coverage that is meant.
 const MAX_LABEL: f32 = 31.0;
@@ -67,6 +67,8 @@ enum Reading {
     Luma,
     /// Numbers of objects: 0 is the background.
     Labels,
+    /// The same, and white is what belongs to no object.
+    LabelsAndVoid,
 }
 
 /// Reads a mask in the size of its file, and what was assumed.
@@ -83,8 +85,11 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
     let mut alphas = if samples.has_alpha() { vec![1.0; pixels] } else { Vec::new() };
     let (mut lowest, mut highest, mut brightest) = (1.0_f32, 0.0_f32, 0.0_f32);
     let (mut unequal, mut colored) = (0, 0);
+    // The brightest but for white, which may be what is no object, and how many pixels have each.
+    let (mut object, mut objects, mut whites) = (0.0_f32, 0, 0);
     // The decoder of PNM scales numbers: those of objects are the ones before.
     let white = coded::read_pnm_white(path).filter(|&white| white > 1.0).unwrap_or(samples.white());
+    let is_white = |luma: f32| luma * white > white - 0.5;
     let is_jpeg = coded::read_kind(path) == Some(FileKind::Jpeg);
     let mut metadata = luma::decode_luma(coded, &mut scratch.pixels, |at, pixel| {
         let LumaPixel { luma, alpha, is_colored } = pixel;
@@ -93,6 +98,11 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
             *place = alpha;
         }
         (lowest, highest, brightest) = (lowest.min(alpha), highest.max(alpha), brightest.max(luma));
+        if is_white(luma) {
+            whites += 1;
+        } else if luma > 0.0 {
+            (object, objects) = (object.max(luma), objects + 1);
+        }
         unequal += usize::from(alpha - luma * alpha > GREY_TOLERANCE);
         colored += usize::from(is_colored && alpha > 0.0);
     })?;
@@ -102,6 +112,7 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
         () if background.is_some() && colored > 0 => Reading::Labels,
         // Compression makes such codes of black.
         () if !is_jpeg && (0.5..=MAX_LABEL).contains(&(brightest * white)) => Reading::Labels,
+        () if !is_jpeg && objects > whites && (0.5..=MAX_LABEL).contains(&(object * white)) => Reading::LabelsAndVoid,
         () => Reading::Luma,
     };
     let (stored, note) = match reading {
@@ -111,6 +122,10 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
             let background = background.filter(|_| colored > 0).unwrap_or(0.0);
             grey.iter_mut().for_each(|grey| *grey = f32::from((*grey - background).abs() * white > 0.5));
             (grey, Some("it numbers objects: 0 is taken as the background, and all others are the subject"))
+        }
+        Reading::LabelsAndVoid => {
+            grey.iter_mut().for_each(|grey| *grey = f32::from(*grey > 0.0 && !is_white(*grey)));
+            (grey, Some("it numbers objects: 0 and white are taken as the background, and all others are the subject"))
         }
     };
     let transform = upright(metadata.take_orientation());

@@ -190,6 +190,14 @@ impl Recording {
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let times_ns = timeline::interpolate_times(&times_ns);
         let period_ns = timeline::median_period_ns(times_ns.iter().copied());
+        if contents.has_times && !timeline::PLAUSIBLE_PERIODS_NS.contains(&period_ns) {
+            let rate = (1e12 / period_ns as f64).round() / 1e3;
+            let dir = dir.display();
+            tracing::warn!(
+                "{dir}: by its times it has {rate} frames per second; are they in the unit of {}?",
+                layout.name
+            );
+        }
         let calibration = options.depth_calibration.or(contents.depth_calibration);
         let layout = layout.name;
         let recording = Self { layout, folder, contents, times_ns, size, period_ns, depth_registration: None };

@@ -18,7 +18,7 @@ const OTHER: &str = "normal normals position positions motion velocity vector fl
     uncertainty variance valid validity mask masks label labels";
 const DISPARITY: &str = "disp disparity disparities";
 const INVERSE: &str = "inv inverse invdepth idepth";
-const DEPTH: &str = "depth depths depthmap zdepth z distance distances";
+const DEPTH: &str = "depth depths depthmap zdepth z pz distance distances";
 
 impl Role {
     /// Returns the role that a name states, such as `ViewLayer.Denoising Depth` or `left_disp0`.
@@ -33,6 +33,11 @@ impl Role {
             () if has(DEPTH) => Self::Depth,
             () => Self::Unstated,
         }
+    }
+
+    /// Returns whether all words of a name state a role.
+    pub fn is_name_only(name: &str) -> bool {
+        words(name).all(|word| Self::of_name(&word) != Self::Unstated)
     }
 
     /// Returns the number of words of a name beside those that state its role: the fewer, the plainer.

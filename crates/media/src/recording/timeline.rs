@@ -1,9 +1,14 @@
 //! Times and frame period of a recording.
 
+use std::ops::RangeInclusive;
+
 use super::{MAX_ENTRIES, Options};
 
 /// Period of a recording with fewer than two known times: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
+
+/// Frame periods of cameras, from 500 per second to one in ten seconds: with others, times may have another unit.
+pub(super) const PLAUSIBLE_PERIODS_NS: RangeInclusive<u64> = 2_000_000..=10_000_000_000;
 
 /// Maximum length of a recording, ten years: keeps arithmetic with times and periods far from overflow.
 pub(super) const MAX_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;

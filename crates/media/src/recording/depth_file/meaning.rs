@@ -179,7 +179,8 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
             known().for_each(|number| ranges[usize::from(number as u16 >> 8)] = true);
             let count = ranges.iter().filter(|range| **range).count();
             // What a sensor does not see it writes as 0 or 65535, so that neither alone means anything.
-            let is_stretched = low == 0.0 && high == 65535.0 && count >= STRETCHED && ranges[240..255].contains(&true);
+            let is_whole = low == 0.0 && high == 65535.0 || fills(known(), 65535.0);
+            let is_stretched = is_whole && count >= STRETCHED && ranges[240..255].contains(&true);
             // 8 bits become 16 by either factor.
             let is_coarse = [256, 257].iter().any(|step| known().all(|number| (number as u32).is_multiple_of(*step)));
             if is_stretched {
@@ -188,7 +189,7 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
                 (is_coarse && count >= MIN_STEPS).then_some("8 bits stretched to 16")
             }
         }
-        Samples::Float if (low, high) == (0.0, 1.0) => Some("numbers stretched from 0 to 1"),
+        Samples::Float if (low, high) == (0.0, 1.0) || fills(known(), 1.0) => Some("numbers stretched from 0 to 1"),
         Samples::Float if (low, high) == (0.0, 255.0) && known().all(|number| number.fract() == 0.0) => {
             Some("whole numbers from 0 to 255")
         }
@@ -201,6 +202,15 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
         }
         Samples::Eight | Samples::Whole => None,
     }
+}
+
+/// Returns whether numbers fill the range from 0 to `white` nearly, as those of a map that was stretched and then scaled in
+/// size do: no distances, as then some are nearer than a camera sees.
+fn fills(numbers: impl Iterator<Item = f32> + Clone, white: f32) -> bool {
+    let share = |count: usize| count as f32 > MAX_IMPLAUSIBLE * numbers.clone().count() as f32;
+    let (_, high) = range_of(numbers.clone());
+    let near = numbers.clone().filter(|&number| number > 0.0 && number < 0.05 * white).count();
+    (0.95 * white..=1.05 * white).contains(&high) && share(near)
 }
 
 /// Returns the smallest and the largest of the numbers.

@@ -161,12 +161,12 @@ pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, Picture
                     header.is_ok_and(|(header, _)| header.shape.iter().all(|&side| side <= MAX_MATRIX_SIDE));
                 let is_prediction = PREDICTIONS.iter().any(|known| stem.eq_ignore_ascii_case(known));
                 let rank = (Role::of_name(&stem), !is_prediction, Role::count_other_words(&stem));
-                maps.push((rank, is_matrix, index, stem));
+                maps.push((is_matrix, rank, index, stem));
             }
         }
     }
     maps.sort_unstable();
-    let Some(((role, is_unnamed, _), _, index, stem)) = maps.first() else {
+    let Some((_, (role, is_unnamed, _), index, stem)) = maps.first() else {
         return Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())));
     };
     if *role == Role::Other {
@@ -178,7 +178,7 @@ pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, Picture
     }
     let mut array = Vec::new();
     read_member(member, max_bytes, &mut array)?;
-    let others = maps.iter().filter(|(_, is_matrix, ..)| !is_matrix).count();
+    let others = maps.iter().filter(|(is_matrix, ..)| !is_matrix).count();
     let note = (*role == Role::Unstated && *is_unnamed && others > 1).then(|| {
         format!(
             "has {others} arrays that may be the map, of which {stem:?} is taken, the first; one of the name \"depth\" \

@@ -15,6 +15,9 @@ use crate::recording::unit::{KEYWORD, MapUnit};
 /// Calibration of a pair, beside its disparities.
 const CALIBRATION: &str = "calib.txt";
 
+/// Number of names in a path that are asked what a map holds: its own, and those of folders.
+const MAX_LEVELS: usize = 6;
+
 /// Reads the unit that a PNG of ours states.
 pub(super) fn read_text(path: &Path) -> Option<MapUnit> {
     let info = coded::read_png_info(path).ok()?;
@@ -49,17 +52,22 @@ pub(super) fn complete(mut values: Values, path: &Path, options: &Options) -> Re
         && let Some(units) = scale_beside(path, values.samples, Some(path))?
     {
         values.stated = Some(MapUnit::Depth { per_m: units.per_m });
-        values.invalid = units.invalid.map(f32::from);
+        values.invalid = values.invalid.or(units.invalid.map(f32::from));
         values.notes.push(units.describe());
     }
     Ok(values)
 }
 
-/// Returns the role that the name of a file states, or that of its folder if its own is a number.
+/// Returns the role that the name of a file states; else that of its folder, or of one above that has no other name than its
+/// role (`disparity/TRAIN/A/0000/left/0006.pfm`).
 fn role_of(path: &Path) -> Role {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let folder = path.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
-    Role::of_name(if stem.contains(char::is_alphabetic) { &stem } else { &folder })
+    let absolute = std::path::absolute(path).unwrap_or_default();
+    let names = absolute.ancestors().filter_map(|part| Some(part.file_stem()?.to_string_lossy()));
+    let mut roles = names.take(MAX_LEVELS).enumerate().filter_map(|(level, name)| {
+        let role = Role::of_name(&name);
+        (level < 2 || Role::is_name_only(&name)).then_some(role).filter(|role| *role != Role::Unstated)
+    });
+    roles.next().unwrap_or_default()
 }
 
 /// Returns the units of whole numbers like those of this map: a file of its recording or beside its picture states them, or

@@ -16,6 +16,9 @@ use crate::recording::tiff_form::{SAVE_MAP, TiffForm};
 /// Memory for the decoder besides the pixels: one strip or tile, and the lists of them.
 const MAX_BUFFER_BYTES: usize = 64 << 20;
 
+/// The number that means unknown, as text (GDAL's "TIFFTAG_GDAL_NODATA").
+const NODATA: Tag = Tag::Unknown(42113);
+
 /// Reads the first picture of a file, upright by its orientation tag.
 pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
     let form = TiffForm::read(&mut file)?;
@@ -40,6 +43,8 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
     let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten();
     // Some writers do not say that it is alpha; 0 says that it is not.
     let may_be_alpha = !matches!(extra.as_deref(), Some([0, ..]));
+    let invalid =
+        decoder.get_tag_ascii_string(NODATA).ok().and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
     // Takes the first of several channels, which must be nearly equal (grey).
     let to_values = |samples, white, stored: Vec<f32>| {
         let channels = (stored.len() / pixels).max(1);
@@ -62,7 +67,7 @@ pub(super) fn read(mut file: File) -> Result<Values, PictureFault> {
             return Err(if form.is_packed() { form.samples_fault(SAVE_MAP) } else { PictureFault::Truncated });
         }
         colors.check(pixels)?;
-        Ok(Values { size: (width, height), numbers, samples, ..Values::default() }.turned(orientation))
+        Ok(Values { size: (width, height), numbers, samples, invalid, ..Values::default() }.turned(orientation))
     };
     let floats = |stored| to_values(Samples::Float, 1.0, stored);
     let whole = |stored| to_values(Samples::Whole, 65535.0, stored);

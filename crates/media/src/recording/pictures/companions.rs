@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::super::decode::{self, PictureKind};
-use super::super::folder::{ENDINGS, find_pictures, has_pictures};
+use super::super::folder::{ENDINGS, find_pictures, has_pictures, strip_suffix};
 use super::super::role::Role;
 
 /// What follows a picture's stem in the name of its depth map.
 pub const MAP_SUFFIXES: [&str; 3] = ["-depth", ".depth", "_depth"];
 
-/// Returns whether a stem ends as those of depth maps do.
+/// Returns whether a stem ends as those of depth maps do, in whichever case.
 pub(in crate::recording) fn is_map(stem: &str) -> bool {
-    MAP_SUFFIXES.iter().any(|suffix| stem.ends_with(suffix))
+    MAP_SUFFIXES.iter().any(|suffix| strip_suffix(stem, suffix).is_some())
 }
 
 /// Returns whether a picture belongs to another one beside it: its name ends as those of depth maps do; or it is grey, and

@@ -125,7 +125,10 @@ fn without_depth(dir: &Path, names: Vec<String>, options: &Options) -> Contents 
 
 /// Returns the folder of the depth maps for the pictures in `dir`, and the suffix of their stems.
 fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
-    if let Some(suffix) = MAP_SUFFIXES.into_iter().find(|suffix| has_pictures(dir, |stem| stem.ends_with(suffix))) {
+    let stems: Vec<String> = find_pictures(dir, is_map).ok()?.iter().map(|name| stem_of(name).to_lowercase()).collect();
+    let count = |suffix: &&str| stems.iter().filter(|stem| stem.ends_with(*suffix)).count();
+    // The first of those that most maps have.
+    if let Some(suffix) = MAP_SUFFIXES.into_iter().rev().max_by_key(count).filter(|_| !stems.is_empty()) {
         return Some((dir.to_owned(), suffix));
     }
     if !companions::find_twin_maps(dir).is_empty() {

@@ -25,19 +25,21 @@ pub(super) const LAYOUT: Layout = Layout {
 };
 
 /// Names of the folder of colour pictures, in order of preference.
-pub(super) const COLOR_FOLDERS: [&str; 5] = ["color", "rgb", "image", "images", "gray"];
-/// Names of the folder of depth maps.
-pub(super) const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
+pub(super) const COLOR_FOLDERS: [&str; 7] = ["color", "rgb", "image", "images", "gray", "Color", "RGB"];
+/// Names of the folder of depth maps: of the colour camera's view before that of another.
+pub(super) const DEPTH_FOLDERS: [&str; 4] = ["aligned_depth", "depth", "depths", "Depth"];
 
 /// Film and pictures of Stray Scanner.
 const FILM: &str = "rgb.mp4";
 
 /// Pairs of pictures that share a folder: its name, then prefix and suffix of colour and of depth.
-const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 4] = [
+const SHARED_FOLDERS: [(&str, [(&str, &str); 2]); 6] = [
     ("results", [("frame", ""), ("depth", "")]),
     ("", [("frame-", ".color"), ("frame-", ".depth")]),
     ("", [("left", ""), ("depth", "")]),
     ("", [("frame_", ""), ("depth_", "")]),
+    ("", [("color_", ""), ("depth_", "")]),
+    ("", [("rgb_", ""), ("depth_", "")]),
 ];
 
 /// Returns the kinds of the colour pictures and depth maps in `dir`, if it has both.
@@ -110,7 +112,9 @@ pub(super) fn from_pairs(
 
 /// Returns the encoding of depth, and a sentence about its unit.
 fn depth_format(scale: Scale, options: &Options) -> Result<(DepthFormat, String), RecordingError> {
-    let scale_given = options.depth_unit.units_per_m().or(options.depth_scale);
+    // To give what is assumed anyway changes nothing: 65535 stays unknown.
+    let is_other = |given: &f32| !matches!(scale, Scale::Millimetres) || *given != Scale::MILLIMETRES_PER_M;
+    let scale_given = options.depth_unit.units_per_m().or(options.depth_scale).filter(is_other);
     Ok(match (options.depth_unit, scale_given) {
         (DepthUnit::Inverse, _) => (DepthFormat::of_pictures(options, 1.0), "depth is relative".to_owned()),
         (_, Some(scale)) => {

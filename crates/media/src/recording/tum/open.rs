@@ -10,7 +10,7 @@ use crate::recording::contents::{Contents, DepthFormat, ListedFrame, Locator, Pi
 use crate::recording::decode::{self, PictureKind};
 use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
-use crate::recording::{Options, Unpaired, pair};
+use crate::recording::{Options, Unpaired, pair, timeline};
 
 /// Maximum number of pictures that are inspected to tell the columns of the associations apart.
 const MAX_PICTURES: usize = 1000;
@@ -93,7 +93,25 @@ fn from_associations(folder: &RecordingFolder, list: &str, options: &Options) ->
         refuse_faults(&folder.dir, pairs.iter().flatten())?;
     }
     let frames = pairs.into_iter().map(|[color, depth]| to_frame(color, Some(depth.source))).collect();
-    Ok(to_contents(frames, Some(options), Unpaired::default()))
+    let mut contents = to_contents(frames, Some(options), Unpaired::default());
+    if are_numbers(&contents.frames) {
+        let rate = timeline::describe_rate(options);
+        tracing::warn!("{}: the times in {list} are the numbers of the frames; {rate}", folder.dir.display());
+        (0..).zip(&mut contents.frames).for_each(|(index, frame)| {
+            frame.time_ns = Some(timeline::numbered_time_ns(index, options));
+        });
+        contents.has_times = false;
+    }
+    Ok(contents)
+}
+
+/// Returns whether times count the frames from 0 or 1, as in the renderings of ICL-NUIM.
+fn are_numbers(frames: &[ListedFrame]) -> bool {
+    const SECOND_NS: u64 = 1_000_000_000;
+    let first = frames.first().and_then(|frame| frame.time_ns).filter(|first| [0, SECOND_NS].contains(first));
+    let mut counted = (0..).zip(frames);
+    frames.len() > 2
+        && first.is_some_and(|first| counted.all(|(n, frame)| frame.time_ns == Some(first + n * SECOND_NS)))
 }
 
 /// Returns whether colour is in the first two columns and depth in the last two, decided by a file that another list
