@@ -303,6 +303,7 @@ impl Options {
             depth_unit: depth.depth_unit.unwrap_or(DepthUnit::Metres),
             depth_invert: depth.depth_invert,
             depth_invalid: Some(depth.depth_invalid),
+            depth_fit: depth.depth_fit,
             period_ns: frames.fps.map(|fps| (1e9 / fps) as u64),
             size: frames.size.map(|size| (size.width, size.height)),
             topics: frames.topic.clone(),

@@ -65,8 +65,8 @@ pub(super) trait Container: Debug + Send + Sync {
     /// Reads a colour picture as it is stored, into `bytes`.
     fn read_stored_color<'a>(&self, frame: usize, bytes: &'a mut Vec<u8>) -> ReadResult<StoredColor<'a>>;
 
-    /// Reads depth in metres, 0 = unknown. Rejects a map that does not cover the view of a picture of `size`: that of the
-    /// colour camera, or of the depth camera if there is a calibration.
+    /// Reads depth in metres, 0 = unknown, of the view of a picture of `size`: that of the colour camera, or of the depth
+    /// camera if there is a calibration. Its own size is any.
     fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult;
 
     /// Reads width and height of a colour picture.

@@ -7,7 +7,6 @@ use pulp::{Arch, WithSimd};
 
 use super::coded::{self, EncodedPicture};
 use super::color_space;
-use super::depth_covers;
 use super::fault::PictureFault;
 use super::photo_metadata::{PhotoMetadata, SIXTEEN_BITS, TRANSPARENCY};
 use super::samples::SampleFormat;
@@ -82,11 +81,6 @@ pub(super) fn read_photo(path: &Path) -> Result<(ColorImage, PhotoMetadata), Pic
 /// Rejects a picture of another size than `expected`.
 pub(super) fn check_color_size(found: (u32, u32), expected: (u32, u32)) -> Result<(), PictureFault> {
     if found == expected { Ok(()) } else { Err(PictureFault::Size { found, expected }) }
-}
-
-/// Rejects a depth map that does not cover a picture of `color` pixels.
-pub(super) fn check_depth_size(found: (u32, u32), color: (u32, u32)) -> Result<(), PictureFault> {
-    if depth_covers(found, color) { Ok(()) } else { Err(PictureFault::DepthSize { found, color }) }
 }
 
 /// Reads width and height of a picture from its header only.
@@ -191,25 +185,23 @@ pub(super) fn read_right_luma(
     })
 }
 
-/// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a picture is rejected.
+/// Decodes 16-bit grey to metres.
 pub(super) fn read_depth(
     path: &Path,
     units: DepthUnits,
-    color_size: Option<(u32, u32)>,
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
     let white = if matches!(coded, EncodedPicture::Png(_)) { None } else { coded::read_pnm_white(path) };
     let units = white.map_or(units, |white| units.scaled(f32::from(u16::MAX) / white));
-    decode_depth(coded, units, color_size, &mut scratch.pixels, into)
+    decode_depth(coded, units, &mut scratch.pixels, into)
 }
 
 /// Decodes an opened picture as [`read_depth`] does. `pixels` is working memory.
 pub(super) fn decode_depth(
     coded: EncodedPicture,
     units: DepthUnits,
-    color_size: Option<(u32, u32)>,
     pixels: &mut Vec<u8>,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
@@ -221,9 +213,8 @@ pub(super) fn decode_depth(
             (false, false) => PictureFault::NotDepth("an 8-bit grey picture"),
         });
     }
-    let found = coded.size();
-    color_size.map_or(Ok(()), |color| check_depth_size(found, color))?;
-    into.resize(found.0, found.1);
+    let (width, height) = coded.size();
+    into.resize(width, height);
     let arch = Arch::new();
     coded.decode_runs(pixels, |first, row| {
         let (values, metres) = (row.as_chunks().0, &mut into.metres[first..]);

@@ -7,10 +7,11 @@ use image::metadata::Orientation;
 
 use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
+use super::depth_file::has_same_view;
 use super::error::{RecordingError, Result};
 use super::fault::{PictureFault, ReadResult};
 use super::upright::upright;
-use super::{Recording, coded, depth_file, luma};
+use super::{Recording, coded, depth_covers, depth_file, luma};
 use bokehcam::calibration::registration::{Registration, RgbdCalibration};
 use bokehcam::frame::DepthMap;
 use bokehcam::optics::StereoRig;
@@ -61,11 +62,10 @@ impl Recording {
         // Maps may have been scaled down since.
         let (mut scratch, mut first) = (Scratch::default(), DepthMap::default());
         let size = match self.decode_depth(0, size, &mut scratch, &mut first) {
-            Ok(()) => first.size(),
-            Err(
-                RecordingError::Picture { fault: PictureFault::DepthSize { found, .. }, .. }
-                | RecordingError::Listed { fault: PictureFault::DepthSize { found, .. }, .. },
-            ) => return Err(PictureFault::CalibratedSize { found, calibrated: size }.to_string()),
+            Ok(()) if depth_covers(first.size(), size) => first.size(),
+            Ok(()) => {
+                return Err(PictureFault::CalibratedSize { found: first.size(), calibrated: size }.to_string());
+            }
             // Told when it is read.
             Err(_) => size,
         };
@@ -79,10 +79,18 @@ impl Recording {
     /// Same as for [`Recording::read_color`]; or the recording has no depth.
     pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<()> {
         let Some(registration) = &self.depth_registration else {
-            return self.decode_depth(index, self.size, scratch, into);
+            self.decode_depth(index, self.size, scratch, into)?;
+            return self.fit_depth(into).map_err(|fault| self.depth_fault(index, fault));
         };
         let mut measured = mem::take(&mut scratch.measured);
         let read = self.decode_depth(index, registration.size(), scratch, &mut measured);
+        let (found, calibrated) = (measured.size(), registration.size());
+        let read = match read {
+            Ok(()) if found != calibrated => {
+                Err(self.depth_fault(index, PictureFault::CalibratedSize { found, calibrated }))
+            }
+            read => read,
+        };
         if read.is_ok() {
             registration.register(&measured, &mut scratch.drawn, into);
         }
@@ -90,13 +98,28 @@ impl Recording {
         read
     }
 
-    /// Reads the depth of frame `index` as it was recorded, of the view of pictures of `size`; of exactly this size if it
-    /// is to be registered.
+    /// Fits depth to the size of the colour pictures. Other aspect ratios are not fitted without being asked, not even
+    /// squares: a note of each frame would be needed.
+    fn fit_depth(&self, map: &mut DepthMap) -> ReadResult {
+        let (found, color) = (map.size(), self.size);
+        if self.depth_fit.is_none() && !has_same_view(found, color) {
+            return Err(PictureFault::DepthSize { found, color });
+        }
+        depth_file::fit_map(map, self.depth_fit, color).map(drop)
+    }
+
+    /// Returns the error of a fault in the depth of frame `index`. Without a depth map, the line of the colour picture is at
+    /// fault.
+    fn depth_fault(&self, index: usize, fault: PictureFault) -> RecordingError {
+        let frame = &self.contents.frames[index];
+        frame.depth.as_ref().unwrap_or(&frame.color).error(&self.folder.dir, fault)
+    }
+
+    /// Reads the depth of frame `index` as it was recorded, of the view of pictures of `size`.
     fn decode_depth(&self, index: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> Result<()> {
         let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
         let form = self.contents.depth.as_ref().ok_or_else(no_depth)?;
         let frame = self.frame(index)?;
-        // Without a depth map, the line of the colour picture is at fault.
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
         let read = match &self.contents.container {
             Some(container) => container.read_depth(index, size, scratch, into),
@@ -108,10 +131,10 @@ impl Recording {
                 let stored_size = turn.rotated_size(size);
                 let read = match form {
                     DepthFormat::Units(units) | DepthFormat::StatedUnits(units) => {
-                        decode::read_depth(&path, *units, Some(stored_size), scratch, into)
+                        decode::read_depth(&path, *units, scratch, into)
                     }
                     DepthFormat::Inverse { white_is_far, invalid } => {
-                        luma::read_inverse_depth(&path, (*white_is_far, *invalid), stored_size, scratch, into)
+                        luma::read_inverse_depth(&path, (*white_is_far, *invalid), scratch, into)
                     }
                     DepthFormat::Disparity(rig) => read_disparity(&path, rig, stored_size, into),
                 };
@@ -121,24 +144,13 @@ impl Recording {
                 read
             }
         };
-        let checked = match (read, &self.depth_registration) {
-            (Ok(()), Some(_)) if into.size() != size => {
-                Err(PictureFault::CalibratedSize { found: into.size(), calibrated: size })
-            }
-            (Err(PictureFault::DepthSize { found, .. }), Some(_)) => {
-                Err(PictureFault::CalibratedSize { found, calibrated: size })
-            }
-            (read, _) => read,
-        };
-        checked.map_err(|fault| source.error(&self.folder.dir, fault))
+        read.map_err(|fault| self.depth_fault(index, fault))
     }
 }
 
-/// Reads disparities, in pixels of the map, as depth. The rig is for the colour picture of `color` pixels, whose view the map
-/// must cover.
+/// Reads disparities, in pixels of the map, as depth. The rig is for the colour picture of `color` pixels.
 fn read_disparity(path: &Path, rig: &StereoRig, color: (u32, u32), into: &mut DepthMap) -> ReadResult {
     let map = depth_file::read_disparity(path)?;
-    decode::check_depth_size(map.size(), color)?;
     let zoom = color.0 as f32 / map.width as f32;
     *into = map.to_depth_map(|px| rig.depth_m(px * zoom));
     Ok(())

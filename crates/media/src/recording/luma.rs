@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::coded::EncodedPicture;
-use super::decode::{Scratch, check_depth_size};
+use super::coded::{EncodedPicture, read_pnm_white};
+use super::decode::Scratch;
 use super::fault::PictureFault;
 use super::photo_metadata::PhotoMetadata;
 use super::samples::{GREY_TOLERANCE, MAX_COLORED};
@@ -11,18 +11,16 @@ use bokehcam::color::luminance;
 use bokehcam::frame::DepthMap;
 
 /// Decodes relative inverse depth (8 or 16 bits, grey, or RGB with grey content) to distances relative to the nearest
-/// one; what is transparent, or has the code `invalid`, is unknown. A map that does not cover a picture of `color` pixels is
-/// rejected, and so are colours.
+/// one; what is transparent, or has the code `invalid`, is unknown. Colours are rejected.
 pub(super) fn read_inverse_depth(
     path: &Path,
     (white_is_far, invalid): (bool, Option<u16>),
-    color: (u32, u32),
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let (found, white) = (coded.size(), coded.samples().white());
-    check_depth_size(found, color)?;
+    let found = coded.size();
+    let white = read_pnm_white(path).unwrap_or(coded.samples().white());
     into.resize(found.0, found.1);
     let mut colored = 0;
     decode_luma(coded, &mut scratch.pixels, |at, LumaPixel { luma, alpha, is_colored }| {

@@ -149,6 +149,8 @@ pub struct Recording {
     period_ns: u64,
     /// For depth of another camera's view.
     depth_registration: Option<Registration>,
+    /// How depth of another aspect ratio is fitted.
+    depth_fit: Option<depth_file::Fit>,
 }
 
 /// Returns whether a file is a recording by itself.
@@ -200,7 +202,16 @@ impl Recording {
         }
         let calibration = options.depth_calibration.or(contents.depth_calibration);
         let layout = layout.name;
-        let recording = Self { layout, folder, contents, times_ns, size, period_ns, depth_registration: None };
+        let recording = Self {
+            layout,
+            folder,
+            contents,
+            times_ns,
+            size,
+            period_ns,
+            depth_registration: None,
+            depth_fit: options.depth_fit,
+        };
         let is_given = options.depth_calibration.is_some();
         recording.register_depth(calibration, is_given)
     }

@@ -1,5 +1,6 @@
 //! How recordings are read.
 
+use super::depth_file::Fit;
 use super::{DepthUnit, RecordingError};
 use bokehcam::calibration::registration::RgbdCalibration;
 
@@ -14,6 +15,9 @@ pub struct Options {
     pub depth_invert: bool,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
+    /// How depth maps of another aspect ratio than their pictures are fitted; `None` for those of nearly the same, and
+    /// squares, to be stretched.
+    pub depth_fit: Option<Fit>,
     /// The calibration of a depth camera that looks from another place than the colour camera, if the recording's depth
     /// is of its view; it replaces the recording's own.
     pub depth_calibration: Option<RgbdCalibration>,
@@ -49,6 +53,7 @@ impl Default for Options {
             depth_unit: DepthUnit::Metres,
             depth_invert: false,
             depth_invalid: None,
+            depth_fit: None,
             depth_calibration: None,
             pair_tolerance_ns: 20_000_000,
             period_ns: None,

@@ -16,7 +16,7 @@ use super::file_kind::{self, FileKind};
 pub use super::photo_metadata::PhotoFormat;
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{DISPARITY_SCALE, MapUnit};
-use super::{check_depth_scale, coded, decode, encode, luma, pfm, tiff_file};
+use super::{check_depth_scale, coded, decode, depth_covers, encode, luma, pfm, tiff_file};
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use bokehcam_files::atomic_file;
@@ -51,7 +51,8 @@ pub fn read_size(path: &Path) -> Result<(u32, u32)> {
 /// # Errors
 /// The map is larger, or of another aspect ratio.
 pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<()> {
-    decode::check_depth_size(depth, color).map_err(RecordingError::picture(path))
+    let fault = (!depth_covers(depth, color)).then_some(PictureFault::DepthSize { found: depth, color });
+    fault.map_or(Ok(()), |fault| Err(RecordingError::picture(path)(fault)))
 }
 
 /// Reads a depth map in metres in its own size, in a format of [`depth_file::read`]. `depth_scale` is for whole numbers,

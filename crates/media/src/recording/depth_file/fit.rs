@@ -39,23 +39,37 @@ pub fn covers(depth: (u32, u32), color: (u32, u32)) -> bool {
     depth.0 <= color.0 && depth.1 <= color.1 && has_same_view(depth, color)
 }
 
-/// Fits the map to a picture of `color` (columns, rows) pixels: it then covers it with at most as many pixels.
+/// Fits the map of a file as [`fit_map`], and notes it.
+///
+/// # Errors
+/// Same as for [`fit_map`].
+pub(super) fn fit_to(file: &mut DepthFile, fit: Option<Fit>, color: (u32, u32)) -> Result<(), PictureFault> {
+    let size = fit_map(&mut file.map, fit, color)?;
+    file.notes.extend(describe_stretch(size, color));
+    Ok(())
+}
+
+/// Fits a map to a picture of `color` (columns, rows) pixels: it then covers it with at most as many pixels. Returns its
+/// size before it is stretched.
 ///
 /// # Errors
 /// It has another aspect ratio, is not [`is_stretchable`], and `fit` does not say what to do.
-pub(super) fn fit_to(file: &mut DepthFile, fit: Option<Fit>, color: (u32, u32)) -> Result<(), PictureFault> {
-    let found = file.map.size();
+pub(in crate::recording) fn fit_map(
+    map: &mut DepthMap,
+    fit: Option<Fit>,
+    color: (u32, u32),
+) -> Result<(u32, u32), PictureFault> {
+    let found = map.size();
     if fit == Some(Fit::Crop) && !has_same_view(found, color) {
-        crop(&mut file.map, color);
+        crop(map, color);
     } else if fit.is_none() && !is_stretchable(found, color) {
         return Err(PictureFault::DepthSize { found, color });
     }
-    let (width, height) = file.map.size();
+    let (width, height) = map.size();
     if width > color.0 || height > color.1 {
-        reduce(&mut file.map, (width.min(color.0), height.min(color.1)));
+        reduce(map, (width.min(color.0), height.min(color.1)));
     }
-    file.notes.extend(describe_stretch((width, height), color));
-    Ok(())
+    Ok((width, height))
 }
 
 /// Describes the change of a map's aspect ratio to that of its picture, if there is one.

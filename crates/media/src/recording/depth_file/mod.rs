@@ -17,6 +17,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
+pub(super) use fit::fit_map;
 pub use fit::{Fit, covers, describe_stretch, has_same_view, is_stretchable};
 pub use inside::{DepthInside, has_other_view, read_inside};
 pub use unit::DepthUnit;

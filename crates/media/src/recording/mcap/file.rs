@@ -76,11 +76,10 @@ impl Container for McapFile {
         })
     }
 
-    fn read_depth(&self, frame: usize, size: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult {
+    fn read_depth(&self, frame: usize, _: (u32, u32), scratch: &mut Scratch, into: &mut DepthMap) -> ReadResult {
         let (picture, topic) = self.read_frame(frame, true, &mut scratch.file)?;
         match picture {
             Picture::Image(image) => {
-                decode::check_depth_size(image.size, size)?;
                 let samples = DepthSamples::from_name(image.format).unwrap_or(DepthSamples::Units);
                 raw_image::decode_depth(&image, samples, self.units, into)
             }
@@ -93,10 +92,10 @@ impl Container for McapFile {
                 let quantization = topic.has_metres().then(|| Quantization::parse(head)).flatten();
                 let units = if quantization.is_some() { WHOLE_NUMBERS } else { self.units };
                 match format.to_lowercase().contains("rvl") {
-                    true => rvl::decode_depth(picture, units, size, into)?,
+                    true => rvl::decode_depth(picture, units, into)?,
                     false => {
                         let coded = EncodedPicture::open_bytes(picture)?;
-                        decode::decode_depth(coded, units, Some(size), &mut scratch.pixels, into)?;
+                        decode::decode_depth(coded, units, &mut scratch.pixels, into)?;
                     }
                 }
                 if let Some(quantization) = quantization {

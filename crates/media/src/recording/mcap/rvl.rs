@@ -2,17 +2,16 @@
 //! `compressed_depth_image_transport` writes them: width and height, then runs of zeros and of differences, each number
 //! in groups of three bits with a flag for more.
 
-use crate::recording::decode::{self, DepthUnits};
+use crate::recording::decode::DepthUnits;
 use crate::recording::decoders::check_size;
 use crate::recording::fault::{PictureFault, ReadResult};
 use bokehcam::frame::DepthMap;
 
-/// Decodes a map to metres. Rejects one that does not cover a picture of `color` pixels.
-pub(super) fn decode_depth(bytes: &[u8], units: DepthUnits, color: (u32, u32), into: &mut DepthMap) -> ReadResult {
+/// Decodes a map to metres.
+pub(super) fn decode_depth(bytes: &[u8], units: DepthUnits, into: &mut DepthMap) -> ReadResult {
     let (sides, coded) = bytes.split_first_chunk::<8>().ok_or(PictureFault::Truncated)?;
     let [width, height] = [0, 4].map(|at| u32::from_le_bytes([sides[at], sides[at + 1], sides[at + 2], sides[at + 3]]));
     check_size(width, height)?;
-    decode::check_depth_size((width, height), color)?;
     into.resize(width, height);
     let mut numbers = Numbers { words: coded.as_chunks().0, word: 0, nibbles: 0 };
     let mut rest = &mut into.metres[..];
@@ -107,7 +106,7 @@ mod tests {
         let coded = encode(8, &depths);
         let units = DepthUnits { scale: 1.0, invalid: None };
         let mut map = DepthMap::default();
-        let mut decode = |bytes: &[u8]| decode_depth(bytes, units, (8, 8), &mut map).map(|()| map.metres.clone());
+        let mut decode = |bytes: &[u8]| decode_depth(bytes, units, &mut map).map(|()| map.metres.clone());
         assert_eq!(decode(&coded).unwrap(), depths.iter().map(|&depth| f32::from(depth)).collect::<Vec<_>>());
         for end in 0..coded.len() - 8 {
             assert!(decode(&coded[..end]).is_err(), "cut at {end}");

@@ -15,7 +15,7 @@ use zip::ZipArchive;
 use super::contents::{
     Container, Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, StoredColor,
 };
-use super::decode::{self, DepthUnits, Scratch};
+use super::decode::{DepthUnits, Scratch};
 use super::decoders::{guard, guard_as};
 use super::error::RecordingError;
 use super::fault::{PictureFault, ReadResult, damaged_fault};
@@ -150,7 +150,6 @@ impl Container for Archive {
         let (width, height) = self
             .find_depth_size(values.len(), size)
             .ok_or_else(|| PictureFault::Damaged(format!("{} depths, which is no size of a map", values.len())))?;
-        decode::check_depth_size((width, height), size)?;
         into.resize(width, height);
         for (metres, &value) in into.metres.iter_mut().zip(values) {
             let value = f32::from_le_bytes(value);
