@@ -16,7 +16,9 @@ use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Rows of the exact gather between two calls of `check_stop`.
+/// Rows of the exact gather between two calls of `check_stop`: for each thread, and at most for all of them, as they
+/// wait for one another after each of these steps.
+const ROWS_PER_THREAD: usize = 16;
 const ROWS_AT_ONCE: usize = 64;
 
 /// Both forms of the gather, with their buffers.
@@ -84,8 +86,9 @@ impl Gather {
         if plan.exact {
             let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
             let kernels = &self.kernels;
-            for first in (0..size.1).step_by(ROWS_AT_ONCE) {
-                workers.run(ROWS_AT_ONCE.min(size.1 - first), &|row| {
+            let rows_at_once = ROWS_AT_ONCE.min(ROWS_PER_THREAD * workers.thread_count());
+            for first in (0..size.1).step_by(rows_at_once) {
+                workers.run(rows_at_once.min(size.1 - first), &|row| {
                     let y = first + row;
                     arch.dispatch(ExactGatherRow { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
                 });
