@@ -82,8 +82,14 @@ def test_results_are_those_of_the_program_alone_and_a_second_start_makes_none(cl
 def test_a_worker_and_a_child_are_killed(cluster, sources, expected, tmp_path):
     out = tmp_path / "out"
     driver = start(out, sources, cluster)
-    child = until(lambda: children_at_work(out), "a recording that is being made")[0]
-    os.kill(parent_of(child), signal.SIGKILL)
+
+    def at_work() -> list[tuple[int, int]]:
+        pairs = [(child, parent_of(child)) for child in children_at_work(out)]
+        # Without a parent of its own it has ended, and a signal to process 0 or 1 would reach others.
+        return [(child, worker) for child, worker in pairs if worker > 1]
+
+    child, worker = until(at_work, "a recording that is being made")[0]
+    os.kill(worker, signal.SIGKILL)
     until(lambda: not is_alive(child), "the death of the program with its worker")
     # Signals to end early are blocked: a truncated recording would pass for a complete one.
     other = until(lambda: [process for process in children_at_work(out) if process != child], "another recording")[0]
