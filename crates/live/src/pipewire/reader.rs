@@ -249,7 +249,8 @@ impl Listener {
         }
         let until_ns = self.last_ns.get() + self.timeout_ns();
         session.iterate(Some(Duration::from_nanos(until_ns.saturating_sub(self.clock.now_ns()))));
-        is_alive() && self.clock.now_ns() < until_ns.max(self.last_ns.get())
+        // If this thread was held up, that deadline may be over although a picture has come just now.
+        is_alive() && self.clock.now_ns() < until_ns.max(self.last_ns.get() + self.timeout_ns())
     }
 
     fn timeout_ns(&self) -> u64 {
