@@ -150,7 +150,9 @@ fn a_screen_reader_finds_the_controls_and_works_them() {
     until("the controls are told", PATIENCE, || {
         told.clear();
         // An object may disappear during the query; then the query is repeated.
-        read(&access, registry, &mut told).is_ok() && told.iter().any(|told| told.name == "Snapshot")
+        read(&access, registry, &mut told).is_ok()
+            && ["Snapshot", "More"].iter().all(|name| told.iter().any(|told| told.name == *name))
+            && told.iter().any(|told| told.name == "Blur" && told.role == SLIDER)
     });
     let by_name = |name: &str| {
         let found = told.iter().find(|told| told.name == name);

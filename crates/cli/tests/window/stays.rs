@@ -18,10 +18,13 @@ fn a_frozen_picture_follows_the_look() {
     let mut program = Program::start(&screen, &[PORTRAIT, "--panel=false", "--quality", "draft"]);
     let window = program.window();
     window.until("the first picture", is_photograph);
+    // Without controls, which come with a key and go after a while, only the blur changes the picture below.
+    window.key(&[], u32::from('h'));
     window.key(&[], u32::from('z'));
     let mut last = None;
-    let frozen = window.until("it stands still", |image| {
-        thread::sleep(Duration::from_millis(600));
+    let frozen = window.until("it stands still, without a note", |image| {
+        // Longer than notes stay visible, or two consecutive pictures would both show them.
+        thread::sleep(Duration::from_secs(6));
         let same = last.as_ref().is_some_and(|last| distance(last, image) < 0.01);
         last = Some(image.clone());
         same
@@ -47,8 +50,12 @@ fn closing_asks_while_it_records_and_what_is_recorded_is_whole() {
         files.filter(|file| file.file_name().to_string_lossy().ends_with(end)).count()
     };
     window.key(&[], u32::from('v'));
-    until("it is recorded", PATIENCE, || ends_with(".part") == 1);
-    thread::sleep(Duration::from_secs(1));
+    // The encoder writes its first bytes with the first second of pictures; without any, no video would be kept.
+    let is_begun = |file: fs::DirEntry| {
+        file.file_name().to_string_lossy().ends_with(".part") && file.metadata().is_ok_and(|file| file.len() > 0)
+    };
+    until("it is recorded", PATIENCE, || fs::read_dir(&folder).unwrap().flatten().any(is_begun));
+    assert_eq!(ends_with(".part"), 1);
     window.close();
     thread::sleep(Duration::from_secs(1));
     assert!(program.runs(), "it closed without asking");
@@ -78,10 +85,8 @@ fn a_window_that_nobody_sees_computes_nothing() {
     });
     window.minimise();
     // The window could return at once, so the program continues to compute for a while.
-    until("it computes nothing", PATIENCE, || used(&program) * 5 < seen);
+    until("it computes nothing", PATIENCE, || (0..3).all(|_| used(&program) * 5 < seen));
     let mut again = 0;
-    let unseen = (0..2).map(|_| used(&program)).sum::<u64>() / 2;
-    assert!(unseen * 5 < seen, "{unseen} of {seen} ticks");
     window.bring_back();
     window.until("a picture again", is_photograph);
     until("it goes on", PATIENCE, || {
@@ -145,7 +150,7 @@ fn a_look_is_there_again_unless_one_begins_afresh() {
     let first = program.home().to_owned();
     // The preset with a six-blade aperture.
     window.key(&[], u32::from('2'));
-    thread::sleep(Duration::from_secs(1));
+    until("the preset", PATIENCE, || program.ctl(&["status", "--json"]).stdout.contains("polygon:6"));
     let ended = program.close();
     assert!(remembered(&first).contains("polygon:6"), "{}", remembered(&first));
     fs::remove_file(first.join("report.json")).unwrap();
