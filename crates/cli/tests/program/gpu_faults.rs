@@ -4,7 +4,7 @@
 #![allow(missing_docs)]
 
 use crate::common;
-mod signal;
+mod runs;
 
 use std::fs;
 use std::path::Path;
@@ -27,8 +27,6 @@ use bokehcam::optics::CocKind;
 use bokehcam_live::sink::yuyv;
 use common::{coc, noise, settings, three_depths};
 use tempfile::TempDir;
-
-use crate::program::{Home, PORTRAIT, Ran, json};
 
 const SIZE: (u32, u32) = (96, 64);
 /// Maximum difference between the executors, in 8-bit codes.
@@ -83,11 +81,19 @@ fn assert_ran(layer: &TempDir, fault: &str, test: &str, ran: &str) {
     assert_eq!(line, Some(ran), "{fault}: {told}");
 }
 
-/// Opens a device, runs `run_self_test` on it, and then sets a timeout of 1 s, which compiling the shaders could exceed.
+/// Opens a device, and runs `run_self_test` on it.
 fn tried(run_self_test: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
     let device = Arc::new(device());
     run_self_test(&device);
-    Arc::new(Arc::into_inner(device).expect("nobody else has it").with_hang_timeout(Duration::from_secs(1)))
+    impatient(device)
+}
+
+/// Shortens the timeout of a device, after its self-test, whose compilation of the shaders could exceed it. Only one
+/// that is to hang gets less than a busy machine may take for a frame.
+fn impatient(device: Arc<Device>) -> Arc<Device> {
+    let hangs = std::env::var("FAULT").is_ok_and(|fault| fault.starts_with("hang"));
+    let timeout = Duration::from_secs(if hangs { 1 } else { 20 });
+    Arc::new(Arc::into_inner(device).expect("nobody else has it").with_hang_timeout(timeout))
 }
 
 /// Creates a frame; every other one requests YUYV output.
@@ -162,10 +168,8 @@ fn executors_come_and_go() {
 fn frames_are_blurred_whatever_becomes_of_the_device() {
     let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
         let device = Arc::new(device);
-        // The self-test compiles the shaders, which may take longer than a second.
         run_self_test(&device)?;
-        let device = Arc::into_inner(device).expect("nobody else has it").with_hang_timeout(Duration::from_secs(1));
-        bokeh::create_blur(&settings(CocKind::Depth), SIZE, Some(Arc::new(device)), Some(1))
+        bokeh::create_blur(&settings(CocKind::Depth), SIZE, Some(impatient(device)), Some(1))
     });
     match made {
         Ok(mut bokeh) => {
@@ -330,19 +334,4 @@ fn matting_goes_on_after_the_gpu() {
     ] {
         assert_ran(&layer, fault, "mattes_are_found_whatever_becomes_of_the_device", ran);
     }
-}
-
-#[test]
-#[ignore = "needs a Vulkan adapter (software will do)"]
-fn a_run_ends_whole_and_says_in_one_line_what_happened() {
-    let (layer, home) = (layer(), Home::new());
-    let stream = ["stream", PORTRAIT, "--backend", "gpu", "--pace", "asap", "--to", "null", "--report", "report.json"];
-    let ran = Ran::of(under(&layer, "submit:6", &mut home.with_drivers(&stream)));
-    let told = ran.done();
-    assert_eq!(told.matches("the CPU blurs from now on").count(), 1, "{told}");
-    assert!(!told.contains("panicked"), "{told}");
-    let report = json(home.path("report.json"));
-    assert_eq!((&report["frames"]["captured"], &report["frames"]["delivered"]), (&24.into(), &24.into()), "{report}");
-    assert_eq!(report["backend"], "gpu, then cpu");
-    assert!(report["adapter"].as_str().unwrap().contains("; then cpu, "), "{report}");
 }
