@@ -55,20 +55,23 @@ fn watcher(daemon: &Daemon) -> (Connection, Receiver<String>) {
     (served.name(WATCHER).unwrap().build().unwrap(), items)
 }
 
+/// Whether a name on the bus has an owner.
+fn has_owner(bus: &Connection, name: &str) -> bool {
+    let asked = bus.call_method(
+        Some("org.freedesktop.DBus"),
+        "/org/freedesktop/DBus",
+        Some("org.freedesktop.DBus"),
+        "NameHasOwner",
+        &name,
+    );
+    asked.unwrap().body().deserialize::<bool>().unwrap()
+}
+
 /// Starts a stream with a tray icon, and waits until it is on the bus.
 fn stream(world: &World, daemon: &Daemon, bus: &Connection) -> Beside {
     let args = ["stream", PORTRAIT, "--loop", "--pace", "realtime", "--quiet", "--to", "null", "--tray"];
     let running = Beside::start(world.bokehcam(&args).env("DBUS_SESSION_BUS_ADDRESS", &daemon.address));
-    until("it is on the bus", || {
-        let asked = bus.call_method(
-            Some("org.freedesktop.DBus"),
-            "/org/freedesktop/DBus",
-            Some("org.freedesktop.DBus"),
-            "NameHasOwner",
-            &NAME,
-        );
-        asked.unwrap().body().deserialize::<bool>().unwrap()
-    });
+    until("it is on the bus", || has_owner(bus, NAME));
     running
 }
 
@@ -139,7 +142,8 @@ fn an_icon_is_in_the_tray_and_a_click_switches() {
         assert!(began.elapsed() < HANG, "the first preset");
     }
     // A restarted tray gets the icon again.
-    drop((tray, items));
+    tray.close().unwrap();
+    until("the tray is gone", || !has_owner(&bus, WATCHER));
     let (_tray, items) = watcher(&daemon);
     assert_eq!(items.recv_timeout(HANG).expect("the icon again"), service);
     assert_eq!(stream.interrupt(), 0);

@@ -86,13 +86,11 @@ fn who_says_nothing_holds_nobody_up() {
     until("six say nothing, and a seventh is served all the same", || {
         let began = Instant::now();
         let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
-        let served = world.tell("stream", b"{\"do\":\"status\"}\n");
+        let is_served = world.tell("stream", b"{\"do\":\"status\"}\n").contains("\"on\":true");
         let took = began.elapsed();
-        assert!(served.contains("\"on\":true"), "{served}");
-        for stream in &silent {
-            assert!(answer(stream).contains("did not arrive within 1 s"));
-        }
-        took < Duration::from_secs(1)
+        // All answers are awaited: by then, the slots are free for another try.
+        let late = silent.iter().filter(|stream| answer(stream).contains("did not arrive within 1 s")).count();
+        is_served && late == silent.len() && took < Duration::from_secs(1)
     });
     // Clients above the limit are refused at once. Slots become free when the first clients time out after 1 s.
     until("most are told at once that there is no room", || {
@@ -105,8 +103,8 @@ fn who_says_nothing_holds_nobody_up() {
     });
     assert_eq!(world.status(&[])["on"], true);
     // A request in pieces must still be complete within 1 s.
-    let mut slow = connect();
     let began = Instant::now();
+    let mut slow = connect();
     for byte in b"{\"do\":\"off\"}            " {
         std::thread::sleep(Duration::from_millis(100));
         if slow.write_all(&[*byte]).is_err() {
