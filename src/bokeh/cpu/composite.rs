@@ -58,7 +58,7 @@ pub struct CompositeScratch {
 }
 
 impl CompositeScratch {
-    pub fn new() -> Self {
+    pub fn new(width: usize) -> Self {
         Self {
             layers: Layers::new(),
             in_focus: Surfaces::new(),
@@ -66,7 +66,7 @@ impl CompositeScratch {
             lines: CacheAligned([[0.0; _]; 4]),
             color: CacheAligned([[0.0; CHUNK]; 3]),
             coc_px: [0.0; CHUNK],
-            contents: Vec::new(),
+            contents: Vec::with_capacity(width.div_ceil(TILE_W)),
         }
     }
 }

@@ -99,7 +99,7 @@ impl CpuBokeh {
                 dilation: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 decimate: DecimateScratch::new(if plan.privacy { width } else { 0 }),
                 blur: Scratch::new(&plan),
-                composite: composite::CompositeScratch::new(),
+                composite: composite::CompositeScratch::new(width),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
