@@ -10,6 +10,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use rustix::process::Signal;
+use serde_json::Value;
 
 use crate::program::assert_accounted;
 use home::*;
@@ -144,15 +145,19 @@ fn an_encoder_that_is_slow_to_begin_costs_no_frames() {
          echo video > \"$out\"",
     );
     let args = format!("stream self {BLUR} --pace realtime --to out/ --to x.mp4 --report report.json --force");
-    // The program waits 2 s for the encoder, which may be too short on a busy machine; then the test repeats.
+    // The program waits 2 s for the encoder, which may be too short on a busy machine, and a folder on a busy disk may
+    // lose a frame; then the test repeats.
     until("no frame comes before it begins", || {
         let _ = fs::remove_file(home.path("before"));
         let _ = fs::remove_dir_all(home.path("out"));
         Ran::of(&mut home.shell(&path, &args)).done();
         let report = json(home.path("report.json"));
         assert_eq!(report["frames"]["captured"], 75, "{}", report["frames"]);
-        assert_eq!(report["frames"]["delivered"].as_u64(), Some(pngs(&home.path("out")) as u64));
-        fs::read_to_string(home.path("before")).unwrap().is_empty()
+        let is_folder = |output: &&Value| output["output"].as_str().unwrap().starts_with("PNG files");
+        let folder = report["outputs"].as_array().unwrap().iter().find(is_folder).unwrap();
+        let (delivered, lost) = (report["frames"]["delivered"].as_u64().unwrap(), folder["lost"].as_u64().unwrap());
+        assert_eq!(delivered - lost, pngs(&home.path("out")) as u64, "{report}");
+        lost == 0 && fs::read_to_string(home.path("before")).unwrap().is_empty()
     });
 }
 
@@ -176,8 +181,11 @@ fn two_signals_at_once_are_one_wish() {
         file.file_name().to_string_lossy().contains("x.y4m") && file.metadata().is_ok_and(|file| file.len() > 0)
     };
     until("a picture", || fs::read_dir(home.0.path()).unwrap().flatten().any(is_begun));
-    run.signal(Signal::TERM);
-    run.end_by(Signal::INT, LONG).done();
+    // A stopped program gets both when it goes on, however busy the machine is; it runs again after the last of them.
+    for signal in [Signal::STOP, Signal::TERM, Signal::INT] {
+        run.signal(signal);
+    }
+    run.end_by(Signal::CONT, LONG).done();
     assert!(home.path("x.y4m").exists());
 }
 

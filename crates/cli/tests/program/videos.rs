@@ -160,8 +160,8 @@ fn a_killed_run_leaves_no_decoder() {
         home.command(&["-q", "stream", "clip.mp4", "--loop", "--pace", "realtime", "--to", "null"])
             .stderr(Stdio::null()),
     );
-    crate::program::until("it decodes", std::time::Duration::from_secs(60), || !run.children().is_empty());
-    let decoder = run.children()[0];
+    let decoder =
+        crate::program::found("it decodes", std::time::Duration::from_secs(60), || run.children().first().copied());
     run.signal(rustix::process::Signal::KILL);
     let gone = || fs::read(format!("/proc/{}/cmdline", decoder.as_raw_nonzero())).map_or(true, |line| line.is_empty());
     crate::program::until("the decoder ends", std::time::Duration::from_secs(60), gone);
