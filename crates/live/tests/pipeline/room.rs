@@ -121,7 +121,7 @@ impl Sink for Sent {
     }
 }
 
-/// Creates a camera of this many frames, which come about as fast as they are sent.
+/// Creates a camera that ends once this many frames are sent; they come about as fast, and a busy machine loses some.
 fn camera(frames: usize, sent: &Sent) -> Box<dyn Camera> {
     let (name, frame_data) = ("a call".into(), FrameData::Color);
     let info = SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, frame_data };
@@ -131,7 +131,7 @@ fn camera(frames: usize, sent: &Sent) -> Box<dyn Camera> {
         while sent.sent.load(Ordering::SeqCst) < index && Instant::now() < until {
             thread::sleep(Duration::from_micros(20));
         }
-        if index == frames {
+        if sent.frames.load(Ordering::SeqCst) >= frames || index == 20 * frames {
             return Captured::End;
         }
         sent.captured.store(index + 1, Ordering::SeqCst);
@@ -161,7 +161,7 @@ fn open(file: &[u8]) -> Box<dyn DepthSource> {
     Box::new(SingleCamera::open(Some(&path), None, &Hints::default()).unwrap())
 }
 
-/// Runs this many frames of a call; `change` adapts the run.
+/// Runs a call until this many frames are sent; `change` adapts the run.
 fn play(
     frames: usize,
     depth: Box<dyn DepthSource>,
@@ -177,13 +177,13 @@ fn play(
     (report, sent)
 }
 
-/// Runs this many frames, and checks that none shows the room and enough are sent; returns in how many a person is sharp.
+/// Sends this many frames, and checks that none shows the room; returns in how many a person is sharp.
 fn check(frames: usize, depth: Box<dyn DepthSource>, look: &Look) -> usize {
     let (report, sent) = play(frames, depth, look, |call, _| run(call));
     report.unwrap();
     assert_eq!(sent.leaks(), BTreeSet::new());
     let count = sent.frames.load(Ordering::SeqCst);
-    assert!(2 * count > frames, "{count} of {frames} frames were sent");
+    assert!(count >= frames, "{count} of {frames} frames were sent");
     sent.persons.load(Ordering::SeqCst)
 }
 
@@ -258,7 +258,7 @@ fn measured_depth_that_is_missing_shows_no_room() {
             }
             Ok(())
         });
-        let (report, sent) = play(1000, depth, &look(FocusRule::Metres(1.0)), |call, _| run(Run { measured, ..call }));
+        let (report, sent) = play(750, depth, &look(FocusRule::Metres(1.0)), |call, _| run(Run { measured, ..call }));
         assert!(report.unwrap().frames.dropped.unpaired > 0);
         assert_eq!(sent.leaks(), BTreeSet::new(), "measured: {measured}, {takes_ms} ms");
         assert!(sent.persons.load(Ordering::SeqCst) > 100);
@@ -326,7 +326,7 @@ fn changes_of_the_look_show_the_room_only_while_the_blur_is_off() {
             scope.spawn(move || {
                 for (number, look) in (1..).zip(looks.iter().cycle()) {
                     let began = sent.captured.load(Ordering::SeqCst);
-                    if began >= 2400 {
+                    if sent.frames.load(Ordering::SeqCst) >= 2400 {
                         return;
                     }
                     changes.switch_look(look.clone(), number, create_blur).unwrap();

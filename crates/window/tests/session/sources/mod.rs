@@ -37,11 +37,15 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         let metres = asked.depth.as_ref().unwrap().metres[5];
         // Refined, but from this frame alone.
         assert!((metres - 2.0 - 0.1 * place as f32).abs() < 0.02, "{metres} m of frame {place}");
-        assert!(asked.stamp.time_ns > last_ns, "media time goes on");
+        let asked_ns = asked.stamp.time_ns;
+        assert!(asked_ns > last_ns, "media time goes on");
         drop(asked);
         let after = watched.frame("those after it", |view| !view.is_seek_target && view.seek == number);
         last_ns = after.stamp.time_ns;
-        assert!((seeker.position_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
+        assert!(last_ns > asked_ns, "{:?}", after.stamp);
+        // A busy machine leaves frames out.
+        let steps = (last_ns - asked_ns) as usize / 40_000_000;
+        assert_eq!(seeker.position_of(after.stamp), (place + steps) % FRAMES, "{:?}", after.stamp);
     }
     watched.session.send(Request::StopOutput(output));
     let closed = watched.heard.session.close();
