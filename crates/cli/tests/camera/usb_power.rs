@@ -44,7 +44,8 @@ fn freeze() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn programs_that_were_frozen_go_on_with_the_webcam() {
     let webcam = Webcam::plug(&[ISOCHRONOUS]);
-    let asked = "--size 320x240 --format MJPG --frames 60 --effect none --to null";
+    // Enough that it still streams when a slow machine has frozen it twice.
+    let asked = "--size 320x240 --format MJPG --frames 150 --effect none --to null";
     let stream = beside(bokehcam(&format!("stream {} {asked}", webcam.node)));
     webcam.line_with("stream MJPEG");
     freeze();
