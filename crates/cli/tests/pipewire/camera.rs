@@ -30,6 +30,7 @@ fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
 fn the_node_is_what_browsers_and_obs_list() {
     folder();
     let player = Player::start("desk-left", &["--to", "pipewire:Desk, left"]);
+    until("it is suspended", || (state("desk-left")? == "suspended").then_some(()));
     let info = &node("desk-left").unwrap()["info"];
     for (key, value) in [("media.class", "Video/Source"), ("media.role", "Camera"), ("node.description", "Desk, left")]
     {
@@ -41,7 +42,6 @@ fn the_node_is_what_browsers_and_obs_list() {
     assert_eq!((&format["mediaSubtype"], &format["format"]), (&"raw".into(), &"YUY2".into()));
     assert_eq!(format["size"], serde_json::json!({ "width": SIZE.0, "height": SIZE.1 }), "one size, and no choice");
     assert_eq!(format["framerate"], serde_json::json!({ "num": FPS, "denom": 1 }));
-    assert_eq!(state("desk-left").as_deref(), Some("suspended"));
     // A second node of the same name gets a suffix, and nodes disappear with their programs.
     let other = Player::start("desk-left-2", &["--to", "pipewire:Desk, left"]);
     assert_eq!(other.end()["pipewire"][0]["node"], "desk-left-2");
@@ -106,7 +106,9 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
     assert!(sink.wants_yuyv());
     let mut reader = GStreamer::start("ready", 40);
     let mut ready = YuyvImage::default();
-    for number in (0..PICTURES).cycle().take(600) {
+    let mut order = (0..PICTURES).cycle();
+    until("the reader's last picture", || {
+        let number = order.next()?;
         let picture = picture(number);
         let flow = if number % 2 == 0 {
             sink.write_frame(&picture, 0)
@@ -116,11 +118,9 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
             sink.write_yuyv(&mut ready, 0)
         };
         assert!(flow.unwrap().is_continue());
-        if !reader.is_reading() {
-            break;
-        }
         std::thread::sleep(Duration::from_secs(1) / FPS);
-    }
+        (!reader.is_reading()).then_some(())
+    });
     let numbers = numbers(&reader.end().frames);
     assert!([0, 1].iter().all(|form| numbers.iter().any(|number| number % 2 == *form)), "{numbers:?}");
 }
@@ -133,12 +133,15 @@ fn two_readers_at_once_get_every_picture() {
     // More pictures than it reads during the other reader's run.
     let mut first = GStreamer::start("bokehcam", 100_000);
     until("the first one reads", || (first.frames().len() > 20).then_some(()));
-    let before = first.frames().len();
-    let second = GStreamer::start("bokehcam", 90).end();
-    assert!(first.is_reading(), "they read at the same time");
-    let frames = first.frames();
-    // Neither reader delays the other.
-    assert!(frames.len() >= before + 60, "{} pictures and {}", frames.len() - before, second.frames.len());
+    // A busy machine may hold one of them up; then the second one reads again.
+    let (frames, second) = until("neither reader delays the other", || {
+        let before = first.frames().len();
+        let second = GStreamer::start("bokehcam", 90).end();
+        assert!(first.is_reading(), "they read at the same time");
+        let frames = first.frames();
+        println!("{} pictures and {}", frames.len() - before, second.frames.len());
+        (frames.len() >= before + 60).then_some((frames, second))
+    });
     drop(first);
     let report = player.end();
     is_accounted_for(&report, &frames);
@@ -238,9 +241,13 @@ fn off_is_off_for_readers_while_another_output_hangs() {
     let off = Ran::of(&mut bokehcam(&["ctl", "--name", "hung", "off"]));
     assert!(off.done().contains("call.mp4: busy"), "{}", off.stderr);
     let before = reader.frames().len();
-    // The reader may still have been writing a picture when the answer came.
-    let after = until("more pictures", || Some(reader.frames()).filter(|frames| frames.len() > before + 4));
-    assert!(after[before + 2..].iter().all(|frame| !known.contains(frame) && *frame == after[before + 2]));
+    // The reader may still have been writing pictures when the answer came.
+    let cards = until("the card, and more pictures", || {
+        let frames = reader.frames().split_off(before);
+        let card = frames.iter().position(|frame| !known.contains(frame))?;
+        (frames.len() > card + 4).then(|| frames[card..].to_vec())
+    });
+    assert!(cards.iter().all(|frame| *frame == cards[0]), "nothing but the card");
     let stat = std::fs::read_to_string(format!("/proc/{ffmpeg}/stat")).unwrap();
     assert!(stat.contains(" T "), "it still hangs: {stat}");
     assert!(signal("-CONT", &ffmpeg).success());

@@ -118,6 +118,12 @@ impl Run {
         !self.program.runs()
     }
 
+    /// Whether the program has given up on a camera that gave no pictures, or was away.
+    pub fn has_given_up(&mut self) -> bool {
+        let said = if self.is_over() { self.said() } else { return false };
+        ["no pictures come", "there is no camera"].iter().any(|why| said.contains(why))
+    }
+
     /// Waits for a failure, of usage or at run time; returns its message.
     pub fn refused(mut self) -> String {
         let ended = until("the refusal", || self.program.0.try_wait().unwrap());
