@@ -4,7 +4,7 @@
 use super::decode::DepthUnits;
 use super::decoders::check_size;
 use super::fault::PictureFault;
-use bokehcam::color::YcbcrMatrix;
+use bokehcam::color::{YcbcrMatrix, round_to_8bit};
 use bokehcam::frame::{ColorImage, DepthMap};
 
 /// Pixels row by row.
@@ -118,8 +118,8 @@ pub(super) fn decode_color(image: &RawImage, into: &mut ColorImage) -> Result<()
                 out.iter_mut().zip(row.chunks_exact(channels)).for_each(|(out, pixel)| *out = rgb.map(|at| pixel[at]));
             }
             ColorFormat::Grey16 => {
-                let high = usize::from(!image.is_big_endian);
-                out.iter_mut().zip(row.as_chunks::<2>().0).for_each(|(out, pixel)| *out = [pixel[high]; 3]);
+                let code = if image.is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+                out.iter_mut().zip(row.as_chunks().0).for_each(|(out, &pixel)| *out = [round_to_8bit(code(pixel)); 3]);
             }
             ColorFormat::Ycbcr422 { luma, chroma: [cb, cr] } => {
                 for (out, pair) in out.chunks_mut(2).zip(row.as_chunks::<4>().0) {
@@ -230,8 +230,8 @@ mod tests {
             assert_eq!(color(&image(format, (2, 1), data.len(), &data)).unwrap(), rgb, "{format}");
         }
         assert_eq!(color(&image("mono8", (2, 1), 2, &[7, 8])).unwrap(), [7, 7, 7, 8, 8, 8]);
-        assert_eq!(color(&image("mono16", (2, 1), 4, &[1, 7, 2, 8])).unwrap(), [7, 7, 7, 8, 8, 8]);
-        let big = RawImage { is_big_endian: true, ..image("mono16", (2, 1), 4, &[7, 1, 8, 2]) };
+        assert_eq!(color(&image("mono16", (2, 1), 4, &[0xFF, 6, 2, 8])).unwrap(), [7, 7, 7, 8, 8, 8]);
+        let big = RawImage { is_big_endian: true, ..image("mono16", (2, 1), 4, &[6, 0xFF, 8, 2]) };
         assert_eq!(color(&big).unwrap(), [7, 7, 7, 8, 8, 8]);
     }
 
