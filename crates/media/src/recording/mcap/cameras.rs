@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, UVec2};
 
 use super::fields::Fields;
 use super::message::{self, Encoding};
@@ -142,10 +142,14 @@ fn read_info(topic: &str, fields: &mut Fields, encoding: Encoding) -> Option<Inf
     let camera: [f64; 9] = fields.f64s()?;
     let _rotation: [f64; 9] = fields.f64s()?;
     let projection: [f64; 12] = fields.f64s()?;
-    let pinhole = |focal_px, center_px| CameraIntrinsics {
-        size: Some((width, height)),
-        focal_px,
-        center_px,
+    // The matrices are those of the whole sensor, and pictures a part of it, binned (REP 104); 0 is the whole, or 1.
+    let [bin_x, bin_y, left, top, rows, columns] = [(); 6].map(|()| fields.u32().unwrap_or(0));
+    let part = UVec2::new(if columns == 0 { width } else { columns }, if rows == 0 { height } else { rows });
+    let (bin, offset) = (UVec2::new(bin_x.max(1), bin_y.max(1)), UVec2::new(left, top).as_dvec2());
+    let pinhole = |focal_px: DVec2, center_px: DVec2| CameraIntrinsics {
+        size: Some((part / bin).into()),
+        focal_px: focal_px / bin.as_dvec2(),
+        center_px: (center_px - offset + 0.5) / bin.as_dvec2() - 0.5,
         distortion: Distortion::RadialTangential([0.0; 8]),
     };
     let [fx, _, cx, _, fy, cy, ..] = camera;

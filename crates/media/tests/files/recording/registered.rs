@@ -107,6 +107,25 @@ fn a_calibration_of_the_recording_itself_that_does_not_fit_is_left_out() {
 }
 
 #[test]
+fn pictures_of_a_part_of_the_sensor_have_their_own_principal_point() {
+    // Both cameras: 128x48 pixels, of which those from (32, 16) to (96, 40) are read, two beside each other as one.
+    let mut file = FILE.to_vec();
+    for model in [&b"plumb_bob"[..], b"inverse_brown_conrady"] {
+        let info = FILE.windows(model.len()).position(|bytes| bytes == model).unwrap();
+        file[info - 12..][..8].copy_from_slice([48_u32, 128].map(u32::to_le_bytes).as_flattened());
+        let matrices = info + FILE[info..].windows(8).position(|bytes| *bytes == 40_f64.to_le_bytes()).unwrap();
+        // In `k`, and in `p` after nine more numbers of `r`.
+        for (at, number) in [(0, 80_f64), (2, 63.5), (5, 27.5), (18, 80.0), (20, 63.5), (24, 27.5)] {
+            file[matrices + 8 * at..][..8].copy_from_slice(&number.to_le_bytes());
+        }
+        // Binning, and the part: its place, height and width.
+        let part = [2_u32, 1, 32, 16, 24, 64].map(u32::to_le_bytes);
+        file[matrices + 8 * 30..][..24].copy_from_slice(part.as_flattened());
+    }
+    assert_registered(&depth_of(&open(&file, &Options::default()).unwrap(), 0).unwrap());
+}
+
+#[test]
 fn without_distances_there_is_nothing_to_register() {
     let scene = Scene::new();
     scene.color("rgb/1.png", (4, 3), 9);
