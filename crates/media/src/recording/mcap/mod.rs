@@ -170,9 +170,9 @@ fn in_order(topic: &Topic, has_stamps: bool) -> Timed {
 /// Pairs the pictures with the depth maps that were taken within half a frame. Returns the time of each frame, and the
 /// positions of its messages in their topics.
 fn pair_frames(color: &Topic, depth: Option<&Topic>) -> Vec<(u64, usize, Option<usize>)> {
-    // Some drivers leave the times at 0.
-    let mut messages = [Some(color), depth].into_iter().flatten().flat_map(|topic| &topic.messages);
-    let has_stamps = messages.all(|message| message.stamp_ns > 0);
+    // Some drivers leave the times at 0, and a simulator's clock begins there.
+    let mut later = [Some(color), depth].into_iter().flatten().flat_map(|topic| topic.messages.iter().skip(1));
+    let has_stamps = later.all(|message| message.stamp_ns > 0);
     let colors = in_order(color, has_stamps);
     let depths = depth.map(|depth| in_order(depth, has_stamps));
     let times = |timed: &Timed| timed.iter().map(|&(time_ns, _)| time_ns).collect::<Vec<_>>();

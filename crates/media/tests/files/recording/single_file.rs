@@ -3,6 +3,7 @@
 //! (10 k, 100, 200) and the depth k + 1 m.
 
 mod limits;
+mod times;
 
 use std::fs;
 use std::path::Path;
@@ -98,7 +99,8 @@ fn text(text: &str) -> Vec<u8> {
 /// A topic: its name, and its pictures' format, shade or millimetres, and times in milliseconds.
 type TestTopic<'a> = (&'a str, &'a str, u8, &'a [u32]);
 
-/// Builds a file without chunks and summary, of images of 4x2 pixels, in the encoding of ROS 2 or ROS 1.
+/// Builds a file without chunks and summary, of images of 4x2 pixels, in the encoding of ROS 2 or ROS 1. The headers
+/// have the times after 100 s, and the messages are recorded at twice the times.
 fn unchunked(topics: &[TestTopic], is_ros1: bool) -> Vec<u8> {
     let mut file = b"\x89MCAP0\r\n".to_vec();
     file.extend(record(1, &[&text("test"), &text("")]));
@@ -131,7 +133,8 @@ fn unchunked(topics: &[TestTopic], is_ros1: bool) -> Vec<u8> {
             message.extend((data.len() as u32 / 2).to_le_bytes());
             message.extend((data.len() as u32).to_le_bytes());
             message.extend(data);
-            let head = [&id.to_le_bytes()[..], &0_u32.to_le_bytes(), &9_u64.to_le_bytes(), &9_u64.to_le_bytes()];
+            let log_ns = (2_000_000 * u64::from(*ms)).to_le_bytes();
+            let head = [&id.to_le_bytes()[..], &0_u32.to_le_bytes(), &log_ns, &log_ns];
             file.extend(record(5, &[&head.concat(), &message]));
         }
     }
