@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use super::contents::{Contents, DepthFormat, Layout, ListedFrame, PictureSource, RecordingFolder, warn_of_damage};
 use super::decode::DepthUnits;
 use super::error::RecordingError;
+use super::timeline::MAX_LENGTH_NS;
 use super::{Options, Unpaired, pair};
 use bokehcam::calibration::registration::RgbdCalibration;
 use bokehcam_files::input;
@@ -112,7 +113,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
     let registered = depth.filter(|_| options.depth_calibration.is_none());
     let depth_calibration = registered.and_then(|depth| find_calibration(&found, &name, depth, color));
     options.warn_of_inverse_unit(&name, depth.is_some());
-    let frames = pair_frames(color, depth);
+    let frames = pair_frames(&name, color, depth);
     let unpaired = Unpaired::beside(frames.len(), color.messages.len(), depth.map(|depth| depth.messages.len()));
     if frames.is_empty() {
         let depth = depth.map_or(String::new(), |depth| depth.to_string());
@@ -169,10 +170,16 @@ fn in_order(topic: &Topic, has_stamps: bool) -> Timed {
 
 /// Pairs the pictures with the depth maps that were taken within half a frame. Returns the time of each frame, and the
 /// positions of its messages in their topics.
-fn pair_frames(color: &Topic, depth: Option<&Topic>) -> Vec<(u64, usize, Option<usize>)> {
+fn pair_frames(name: &str, color: &Topic, depth: Option<&Topic>) -> Vec<(u64, usize, Option<usize>)> {
+    let topics = [Some(color), depth].into_iter().flatten();
+    let stamps = topics.clone().flat_map(|topic| topic.messages.iter().map(|message| message.stamp_ns));
+    let length_ns = stamps.clone().max().zip(stamps.min()).map_or(0, |(last, first)| last - first);
+    if length_ns > MAX_LENGTH_NS {
+        tracing::warn!("{name}: the times in headers span more than ten years: those of recording are used");
+    }
     // Some drivers leave the times at 0, and a simulator's clock begins there.
-    let mut later = [Some(color), depth].into_iter().flatten().flat_map(|topic| topic.messages.iter().skip(1));
-    let has_stamps = later.all(|message| message.stamp_ns > 0);
+    let mut later = topics.flat_map(|topic| topic.messages.iter().skip(1));
+    let has_stamps = length_ns <= MAX_LENGTH_NS && later.all(|message| message.stamp_ns > 0);
     let colors = in_order(color, has_stamps);
     let depths = depth.map(|depth| in_order(depth, has_stamps));
     let times = |timed: &Timed| timed.iter().map(|&(time_ns, _)| time_ns).collect::<Vec<_>>();

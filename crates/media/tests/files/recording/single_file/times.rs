@@ -30,4 +30,7 @@ fn times_in_headers_count_unless_they_are_not_set() {
     assert_eq!(times_ms([[5, 0], [5, 40], [5, 80], [5, 120]]), [0, 40, 80, 120]);
     assert_eq!(times_ms([[0, 0], [0, 100], [0, 200], [0, 300]]), [0, 100, 200, 300], "a simulator's clock begins at 0");
     assert_eq!(times_ms([[0, 0], [0, 0], [7, 0], [7, 33]]), [0, 66, 132, 198], "not set");
+    let epoch_s = 1_700_000_000;
+    let set_later = [[0, 500], [epoch_s, 0], [epoch_s, 33], [epoch_s, 66]];
+    assert_eq!(times_ms(set_later), [0, 66, 132, 198], "the first is of another age");
 }
