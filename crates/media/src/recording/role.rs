@@ -10,7 +10,7 @@ pub(super) enum Role {
     /// The name says nothing.
     #[default]
     Unstated,
-    /// What is measured beside depth: normals, positions, motion, confidence, masks.
+    /// What is measured beside depth: normals, positions, motion, confidence, masks, infrared.
     Other,
 }
 
@@ -19,6 +19,8 @@ const OTHER: &str = "normal normals position positions motion velocity vector fl
 const DISPARITY: &str = "disp disparity disparities";
 const INVERSE: &str = "inv inverse invdepth idepth";
 const DEPTH: &str = "depth depths depthmap zdepth z pz distance distances";
+/// Yields to depth, which may be named after the infrared camera that has its view.
+const INFRARED: &str = "ir infra infrared";
 
 impl Role {
     /// Returns the role that a name states, such as `ViewLayer.Denoising Depth` or `left_disp0`.
@@ -31,6 +33,7 @@ impl Role {
             () if has(DISPARITY) => Self::Disparity,
             () if has(INVERSE) => Self::InverseDepth,
             () if has(DEPTH) => Self::Depth,
+            () if has(INFRARED) => Self::Other,
             () => Self::Unstated,
         }
     }
@@ -82,6 +85,9 @@ mod tests {
             ("depth_confidence", Role::Other),
             ("depthNormals", Role::Other),
             ("00000_depth_mask", Role::Other),
+            ("image_ir_rect", Role::Other),
+            ("infra1", Role::Other),
+            ("aligned_depth_to_infra1", Role::Depth),
             ("display", Role::Unstated),
             ("dispatcher_2", Role::Unstated),
             ("prediction", Role::Unstated),

@@ -110,6 +110,10 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         let depth = depth.map_or(String::new(), |depth| format!(", and depth from {depth}"));
         tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
     }
+    let other = found.topics.iter().find(|topic| topic.content(false) != topic.content(true));
+    if let Some(other) = other.filter(|_| depth.is_none()) {
+        tracing::warn!("{name}: {other} is no depth by its name; --topic {other} takes it as depth");
+    }
     let registered = depth.filter(|_| options.depth_calibration.is_none());
     let depth_calibration = registered.and_then(|depth| find_calibration(&found, &name, depth, color));
     options.warn_of_inverse_unit(&name, depth.is_some());

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::message::{Encoding, Kind, Preview};
 use crate::recording::raw_image::{ColorFormat, DepthSamples};
+use crate::recording::role::Role;
 
 /// A message with a picture, in the file or in a chunk.
 #[derive(Clone, Copy, Debug)]
@@ -38,13 +39,15 @@ pub(super) struct Topic {
 pub(super) enum Content {
     Color,
     Depth,
+    /// Disparity or inverse depth, which is not read.
+    Disparity,
 }
 
 impl Content {
     fn name(self) -> &'static str {
         match self {
             Self::Color => "colour",
-            Self::Depth => "depth",
+            Self::Depth | Self::Disparity => "depth",
         }
     }
 }
@@ -70,21 +73,29 @@ impl Topic {
         self.messages.push(message);
     }
 
-    /// Returns what its pictures show; `None` if their format is not read.
-    pub fn content(&self) -> Option<Content> {
-        let is_named_depth = self.name.contains("depth");
-        match self.kind {
-            Kind::Image if is_named_depth && self.format == "mono16" => Some(Content::Depth),
-            Kind::Image if DepthSamples::from_name(&self.format).is_some() => Some(Content::Depth),
-            Kind::Image => ColorFormat::from_name(&self.format).map(|_| Content::Color),
-            // Such as `16UC1; compressedDepth png`, or `rgb8; jpeg compressed bgr8`.
-            Kind::CompressedImage => {
-                let is_depth = self.format.contains("compressedDepth")
-                    || self.name.ends_with("/compressedDepth")
-                    || DepthSamples::from_name(self.format.split(';').next().unwrap_or_default()).is_some();
-                Some(if is_depth { Content::Depth } else { Content::Color })
+    /// Returns what its pictures show; `None` if there are none, their format is not read, or their name says that they
+    /// are no depth, such as infrared, unless `is_chosen` by the user.
+    pub fn content(&self, is_chosen: bool) -> Option<Content> {
+        let is_compressed = self.kind == Kind::CompressedImage;
+        // Such as `16UC1; compressedDepth png`, or `rgb8; jpeg compressed bgr8`.
+        let encoding = self.format.split(';').next().unwrap_or_default();
+        let is_depth = DepthSamples::from_name(encoding).is_some()
+            || is_compressed && (self.format.contains("compressedDepth") || self.name.ends_with("/compressedDepth"));
+        match self.role() {
+            _ if self.messages.is_empty() => None,
+            Role::Disparity | Role::InverseDepth if is_depth => Some(Content::Disparity),
+            Role::Other if is_depth => is_chosen.then_some(Content::Depth),
+            Role::Depth | Role::Unstated if is_depth || encoding == "mono16" && self.name.contains("depth") => {
+                Some(Content::Depth)
             }
+            _ => (is_compressed || ColorFormat::from_name(encoding).is_some()).then_some(Content::Color),
         }
+    }
+
+    /// Returns what the last two parts of its name state, above all the last one: those before name cameras.
+    fn role(&self) -> Role {
+        let mut parts = self.base_name().rsplit('/').take(2).map(Role::of_name);
+        parts.find(|role| *role != Role::Unstated).unwrap_or_default()
     }
 
     /// Returns whether its depth is in metres, and needs no scale.
@@ -101,8 +112,8 @@ impl Topic {
     /// sees it.
     fn is_preferred(&self, content: Content) -> bool {
         match content {
-            Content::Color => !self.format.starts_with("mono") && self.format != "8UC1" && !self.name.contains("infra"),
-            Content::Depth => ["aligned", "registered"].iter().any(|word| self.name.contains(word)),
+            Content::Color => !self.format.starts_with("mono") && self.format != "8UC1" && self.role() != Role::Other,
+            _ => ["aligned", "registered"].iter().any(|word| self.name.contains(word)),
         }
     }
 }
@@ -119,9 +130,15 @@ pub(super) struct Choice {
 /// Chooses the topics: those that are `named`, else the only one of its content, or the preferred one.
 ///
 /// # Errors
-/// The reason in one line.
+/// The reason in one line: nothing or several may be meant, or depth is not in metres.
 pub(super) fn choose(topics: &[Topic], named: &[String], others: &[String]) -> Result<Choice, String> {
     let mut chosen = [None; 2];
+    let unread = |topic: &Topic| {
+        format!(
+            "{topic} holds disparity or inverse depth by its name, not metres; name another topic with --topic, or \
+             only that of colour, to play it without depth"
+        )
+    };
     for name in named {
         let is_named = |topic: &Topic| topic.name == *name || topic.name.trim_start_matches('/') == *name;
         let position = topics.iter().position(|topic| is_named(topic) && !topic.messages.is_empty());
@@ -129,8 +146,11 @@ pub(super) fn choose(topics: &[Topic], named: &[String], others: &[String]) -> R
             position.ok_or_else(|| format!("--topic {name}: no pictures there; {}", list(topics, others)))?;
         let topic = &topics[position];
         let content = topic
-            .content()
+            .content(true)
             .ok_or_else(|| format!("--topic {name}: pictures of format {:?} are not read", topic.format))?;
+        if content == Content::Disparity {
+            return Err(unread(topic));
+        }
         let place = &mut chosen[content as usize];
         if let Some(other) = place.replace(position).filter(|&other| other != position) {
             let (one, other) = (&topics[other], content.name());
@@ -149,6 +169,10 @@ pub(super) fn choose(topics: &[Topic], named: &[String], others: &[String]) -> R
         Ok(position)
     };
     let (color, depth) = (find(Content::Color)?, find(Content::Depth)?);
+    let disparity = topics.iter().find(|topic| topic.content(false) == Some(Content::Disparity));
+    if let Some(topic) = disparity.filter(|_| depth.is_none() && named.is_empty()) {
+        return Err(unread(topic));
+    }
     let color =
         color.ok_or_else(|| format!("no topic with colour pictures that are read; {}", list(topics, others)))?;
     Ok(Choice { color, depth, is_guess })
@@ -157,8 +181,7 @@ pub(super) fn choose(topics: &[Topic], named: &[String], others: &[String]) -> R
 /// Returns the topic of a content, if there is one, and whether there is no other choice; `None` if there are several
 /// and none is preferred.
 fn find_preferred(topics: &[Topic], content: Content) -> Option<(Option<usize>, bool)> {
-    let has = |&at: &usize| topics[at].content() == Some(content) && !topics[at].messages.is_empty();
-    let all: Vec<usize> = (0..topics.len()).filter(has).collect();
+    let all: Vec<usize> = (0..topics.len()).filter(|&at| topics[at].content(false) == Some(content)).collect();
     // Of the same pictures, those without compression are exact.
     let is_original = |at: usize| topics[at].kind == Kind::Image;
     let is_copy = |&at: &usize| {

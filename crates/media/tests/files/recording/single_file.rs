@@ -4,6 +4,7 @@
 
 mod limits;
 mod times;
+mod topics;
 
 use std::fs;
 use std::path::Path;
@@ -114,6 +115,7 @@ fn unchunked(topics: &[TestTopic], is_ros1: bool) -> Vec<u8> {
         for ms in *times_ms {
             let samples = match *format {
                 "16UC1" => vec![0, *value],
+                "32FC1" => f32::from(*value).to_le_bytes().to_vec(),
                 "rgb8" | "bgr8" => vec![*value; 3],
                 _ => vec![*value],
             };
