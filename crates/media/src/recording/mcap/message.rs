@@ -62,9 +62,19 @@ impl<'a> Preview<'a> {
     /// Number of bytes of a message in which all this is.
     pub const BYTES: usize = 512;
 
-    /// Parses the beginning of a message.
+    /// Parses the beginning of a message. The format of a PNG of 16-bit grey is completed where it states no encoding.
     pub fn parse(bytes: &'a [u8], kind: Kind, encoding: Encoding) -> Option<Self> {
-        Self::read(&mut start(bytes, encoding)?, kind, encoding)
+        let mut fields = start(bytes, encoding)?;
+        let mut preview = Self::read(&mut fields, kind, encoding)?;
+        let is_png = kind == Kind::CompressedImage && preview.format.ends_with("png") && !preview.format.contains(';');
+        if is_png && fields.u32().is_some() {
+            // A PNG has the bits per sample and the type of colour in bytes 24 and 25.
+            let head: Option<Vec<u8>> = (0..26).map(|_| fields.u8()).collect();
+            if matches!(head.as_deref(), Some([0x89, b'P', b'N', b'G', .., 16, 0])) {
+                preview.format = "mono16; png";
+            }
+        }
+        Some(preview)
     }
 
     fn read(fields: &mut Fields<'a>, kind: Kind, encoding: Encoding) -> Option<Self> {

@@ -1,9 +1,12 @@
 //! What topics hold by their names and formats.
 
-use bokehcam_media::recording::{Options, Recording, RecordingError};
+use std::io::Cursor;
 
-use super::super::{Scene, assert_says, depth_of};
-use super::{CAMERA, TestTopic, open, unchunked, with_topics};
+use bokehcam_media::recording::{Options, Recording, RecordingError};
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, RgbImage};
+
+use super::super::{Scene, assert_says, color_of, depth_of};
+use super::{CAMERA, TestTopic, open, record, text, unchunked, with_topics};
 
 /// Opens a recording of colour, and of other topics: their names, formats, and millimetres / 256 or metres.
 fn open_with(others: &[(&str, &str, u8)], options: &Options) -> Result<Recording, RecordingError> {
@@ -46,5 +49,46 @@ fn disparity_is_not_taken_as_metres() {
         }
         assert_eq!(chosen_m(&[disparity], &[CAMERA[1].0]), None);
         assert_eq!(chosen_m(&[disparity, ("/stereo/depth", "32FC1", 3)], &[]), Some(3.0));
+    }
+}
+
+/// Builds a file of one compressed picture in each topic, a PNG of 4x2 pixels: the name, the format, and its pixels.
+fn compressed(topics: &[(&str, &str, DynamicImage)]) -> Vec<u8> {
+    let mut file = unchunked(&[], true);
+    file.extend(record(3, &[&8_u16.to_le_bytes(), &text("sensor_msgs/CompressedImage"), &text(""), &text("")]));
+    for (id, (name, format, pixels)) in (1_u16..).zip(topics) {
+        let ids = [id.to_le_bytes(), 8_u16.to_le_bytes()].concat();
+        file.extend(record(4, &[&ids, &text(name), &text("ros1"), &0_u32.to_le_bytes()]));
+        let mut png = Cursor::new(Vec::new());
+        pixels.write_to(&mut png, ImageFormat::Png).unwrap();
+        let png = png.into_inner();
+        // Numbers and times of the record, and those of the message.
+        let numbers = [&id.to_le_bytes()[..], &[0; 20], &[1; 12]].concat();
+        file.extend(record(5, &[&numbers, &text("camera"), &text(format), &(png.len() as u32).to_le_bytes(), &png]));
+    }
+    file
+}
+
+#[test]
+fn a_png_of_16_bits_is_depth_where_the_name_says_so() {
+    let scene = Scene::new();
+    let plain = |rgb: [u8; 3]| DynamicImage::from(RgbImage::from_pixel(4, 2, rgb.into()));
+    let color = ("/camera/color/image_raw/compressed", "png", plain([90, 9, 9]));
+    let grey16 = DynamicImage::from(ImageBuffer::<Luma<u16>, _>::from_pixel(4, 2, [2000_u16].into()));
+    let depth_name = "/camera/depth/image_raw/compressed";
+    for format in ["png", "image/png", "mono16; png compressed mono16", "16UC1; png compressed 16UC1"] {
+        let file = compressed(&[color.clone(), (depth_name, format, grey16.clone())]);
+        for options in [Options::default(), with_topics(&[color.0, depth_name])] {
+            let recording = open(&scene, "take.mcap", &file, &options).unwrap();
+            assert_eq!(depth_of(&recording, 0).unwrap().metres, [2.0; 8], "{format}");
+            assert_eq!(color_of(&recording, 0).unwrap().rgb[0], 90, "{format}");
+        }
+    }
+    // Infrared, and colours of depth.
+    let colored = (depth_name, "png", plain([80, 9, 9]));
+    for others in [vec![("/camera/infra1/image_raw/compressed", "png", grey16)], vec![]] {
+        let file = compressed(&[&[colored.clone()][..], &others].concat());
+        let recording = open(&scene, "take.mcap", &file, &Options::default()).unwrap();
+        assert_eq!((recording.has_depth(), color_of(&recording, 0).unwrap().rgb[0]), (false, 80));
     }
 }
