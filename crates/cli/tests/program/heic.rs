@@ -6,7 +6,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use bokehcam::frame::ColorImage;
-use bokehcam_media::recording::still::{read_color, write_color};
+use bokehcam_media::recording::still::{read_color, write_color, write_photo};
+use bokehcam_media::recording::{Photo, PhotoMetadata};
 use rustix::process::Signal;
 
 use crate::program::{Beside, Home, Ran, until};
@@ -35,6 +36,31 @@ fn a_heic_picture_is_converted_by_the_installed_program() {
     let path = home.add_program("heif-convert", "cp shot.png \"$3\"");
     render(&home, &path).done();
     assert_eq!(read_color(&home.path("out.png")).unwrap().size(), (40, 30));
+}
+
+/// Adds a converter that writes `shot.png`, of 40 by 30 pixels, and depth inside; returns its `PATH`.
+fn add_converter_with_depth(home: &Home) -> String {
+    image::GrayImage::from_fn(40, 30, |x, _| [(6 * x) as u8].into()).save(home.path("depth.png")).unwrap();
+    home.add_program("heif-convert", "cp shot.png \"$3\"; cp depth.png \"$(dirname \"$3\")/picture-depth.png\"")
+}
+
+#[test]
+fn a_heic_picture_is_upright_whatever_its_exif_says() {
+    let home = home();
+    // EXIF with the camera's name, and the orientation of a phone held upright.
+    let entries = b"\x01\x10\0\x02\0\0\0\x04CAM\0\x01\x12\0\x03\0\0\0\x01\0\x06\0\0";
+    let exif = [&b"MM\0\x2a\0\0\0\x08\0\x02"[..], entries, &[0; 4]].concat();
+    let metadata = PhotoMetadata { exif: Some(exif), ..PhotoMetadata::default() };
+    write_photo(&home.path("shot.png"), &ColorImage::new(40, 30), &metadata, true).unwrap();
+    let path = add_converter_with_depth(&home);
+    for out in ["out.png", "out.jpg"] {
+        let arguments = ["render", "in.heic", "--blur", "3", "--backend", "cpu", "--out", out];
+        let ran = Ran::of(home.command(&arguments).env("PATH", &path));
+        assert!(ran.done().contains("depth by in.heic itself (HEIC)"), "{}", ran.stderr);
+        let Photo { color, metadata, .. } = Photo::read(&home.path(out)).unwrap();
+        assert_eq!(color.size(), (40, 30), "{out}");
+        assert!(metadata.exif.unwrap().windows(3).any(|part| part == b"CAM"), "{out}");
+    }
 }
 
 #[test]

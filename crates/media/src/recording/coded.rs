@@ -237,7 +237,7 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
     let (file, kind) = open_detected(path)?;
     let of_exif = |exif: &[u8]| Orientation::from_exif_chunk(exif);
     let orientation = guard(|| match kind {
-        Some(FileKind::Png) => Ok(read_png_exif(file)?.as_deref().and_then(of_exif)),
+        Some(FileKind::Png) => Ok(read_png_exif(file)?.and_then(|(_, exif)| of_exif(&exif))),
         Some(FileKind::Jpeg) => {
             let mut start = Vec::new();
             file.take(MAX_EXIF_START_BYTES).read_to_end(&mut start)?;
@@ -249,8 +249,8 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
     Ok(orientation?.unwrap_or(Orientation::NoTransforms))
 }
 
-/// Returns the EXIF of a PNG, which may stand behind the pixels.
-fn read_png_exif(file: File) -> std::io::Result<Option<Vec<u8>>> {
+/// Returns the EXIF of a PNG, which may stand behind the pixels, and its position in the file.
+pub(super) fn read_png_exif(file: impl Read + Seek) -> std::io::Result<Option<(u64, Vec<u8>)>> {
     let mut file = BufReader::new(file);
     file.seek_relative(8)?;
     loop {
@@ -259,9 +259,9 @@ fn read_png_exif(file: File) -> std::io::Result<Option<Vec<u8>>> {
         let length = head[..4].iter().fold(0, |length, &byte| length << 8 | u64::from(byte));
         match &head[4..] {
             b"eXIf" => {
-                let mut exif = Vec::new();
-                file.take(length.min(MAX_EXIF_START_BYTES)).read_to_end(&mut exif)?;
-                return Ok(Some(exif));
+                let (position, mut exif) = (file.stream_position()?, Vec::new());
+                file.take(length.min(MAX_JPEG_BYTES)).read_to_end(&mut exif)?;
+                return Ok(Some((position, exif)));
             }
             b"IEND" => return Ok(None),
             _ => file.seek_relative(length as i64 + 4)?,

@@ -2,16 +2,20 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
+use image::metadata::Orientation;
 use tempfile::TempDir;
 
+use super::coded;
 use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
+use super::photo_metadata::PhotoMetadata;
 use bokehcam_files::guardian::Guardian;
 use bokehcam_files::process::Process;
 
@@ -26,7 +30,7 @@ const PICTURE: &str = "picture.png";
 pub(super) struct Converted {
     _folder: TempDir,
     _guardian: Option<Guardian>,
-    /// A PNG, upright.
+    /// A PNG, upright, as its EXIF says.
     pub(super) picture: PathBuf,
     /// A PNG of its depth, if there is any; with XMP by newer versions of the program.
     pub(super) depth: Option<PathBuf>,
@@ -67,6 +71,8 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
     };
     match find(["", "-1"]) {
         Some(picture) if status.success() => {
+            // The decoder reports a fault of the PNG.
+            let _ = mark_upright(&picture);
             let depth = find(["-depth", "-1-depth"]);
             Ok(Converted { picture, depth, _folder: folder, _guardian: guardian })
         }
@@ -75,6 +81,19 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
             Err(PictureFault::Damaged(format!("{PROGRAM}: {}", last.unwrap_or("it left no picture"))))
         }
     }
+}
+
+/// Makes the EXIF of a converted PNG say that it is upright: a HEIC picture is turned by its properties alone (`irot`), and
+/// old versions of the program keep a tag that would turn it again.
+fn mark_upright(picture: &Path) -> io::Result<()> {
+    let file = fs::File::options().read(true).write(true).open(picture)?;
+    let Some((position, exif)) = coded::read_png_exif(&file)? else { return Ok(()) };
+    let mut metadata = PhotoMetadata { exif: Some(exif), ..PhotoMetadata::default() };
+    if metadata.take_orientation() == Orientation::NoTransforms {
+        return Ok(());
+    }
+    let chunk = [&b"eXIf"[..], &metadata.exif.unwrap_or_default()].concat();
+    file.write_all_at(&[&chunk[4..], &crc32fast::hash(&chunk).to_be_bytes()].concat(), position)
 }
 
 #[cfg(test)]
