@@ -64,6 +64,23 @@ fn a_heic_picture_is_upright_whatever_its_exif_says() {
 }
 
 #[test]
+fn a_heic_picture_with_depth_inside_is_itself_and_shown_in_srgb() {
+    let home = home();
+    let mut picture = ColorImage::new(40, 30);
+    picture.rgb.as_chunks_mut::<3>().0.fill([200, 60, 40]);
+    let icc_profile = Some(moxcms::ColorProfile::new_display_p3().encode().unwrap());
+    let metadata = PhotoMetadata { icc_profile, ..PhotoMetadata::default() };
+    write_photo(&home.path("shot.png"), &picture, &metadata, true).unwrap();
+    let shown = read_color(&home.path("shot.png")).unwrap();
+    assert_ne!(shown, picture);
+    let path = add_converter_with_depth(&home);
+    let arguments = ["stream", "in.heic", "--effect", "none", "--to", "s/"];
+    let ran = Ran::of(home.command(&arguments).env("PATH", &path));
+    assert!(!ran.done().contains("the phone's own blur"), "{}", ran.stderr);
+    assert!(read_color(&home.path("s/000000.png")).unwrap() == shown);
+}
+
+#[test]
 fn without_the_program_its_package_is_named() {
     let home = home();
     let said = ["in.heic: it is a HEIC picture", "heif-convert (package libheif-examples)", "IN.heic OUT.png"];

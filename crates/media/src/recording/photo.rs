@@ -122,14 +122,6 @@ impl Photo {
 
     /// Replaces the picture by the 8-bit `original` inside the file, whose colour space is the same.
     pub fn replace_by_original(&mut self, original: ColorImage) {
-        // HEIC has the picture itself there.
-        let is_same = match &self.codes {
-            Some(codes) => codes.size() == original.size() && codes.to_8bit() == original.rgb,
-            None => self.color == original,
-        };
-        if is_same {
-            return;
-        }
         let curves = self.codes.take().map(|codes| codes.curves).filter(|curves| !curves.are_srgb());
         self.codes = curves.map(|curves| Picture16::from_8bit(original.size(), &original.rgb, curves));
         (self.is_16bit, self.alpha) = (false, None);

@@ -127,8 +127,7 @@ pub fn find(file: &[u8]) -> Result<Option<EmbeddedDepth>, PictureFault> {
     first_fault.map_or(Ok(None), |(kind, what)| Err(PictureFault::EmbeddedDepth { kind, what }))
 }
 
-/// Does the same as [`find`] for the file `path`, which may also be HEIC if `heif-convert` is installed. The `original` of
-/// a HEIC picture is then the picture itself, converted: reading that saves a second conversion.
+/// Does the same as [`find`] for the file `path`, which may also be HEIC if `heif-convert` is installed.
 ///
 /// # Errors
 /// The same as for [`find`]; or the file cannot be read or converted.
@@ -150,16 +149,12 @@ pub fn has_other_view(path: &Path) -> Result<bool, PictureFault> {
 pub(super) fn of_converted(converted: &heif::Converted) -> Result<Option<EmbeddedDepth>, PictureFault> {
     let Some(depth) = &converted.depth else { return Ok(None) };
     let (map, _) = coded::read_whole(depth)?;
-    let found = match find(&map)? {
-        Some(found) => found,
-        None => {
-            tracing::warn!("heif-convert leaves out the range of the depth: only the order of distances is known");
-            let meaning = Meaning::Disparity { min: 0.0, max: 1.0 };
-            EmbeddedDepth { kind: "HEIC", map, meaning, is_metric: false, focus: None, original: None }
-        }
-    };
-    let (picture, _) = coded::read_whole(&converted.picture)?;
-    Ok(Some(EmbeddedDepth { original: Some(picture).filter(|picture| is_complete(picture)), ..found }))
+    if let Some(found) = find(&map)? {
+        return Ok(Some(found));
+    }
+    tracing::warn!("heif-convert leaves out the range of the depth: only the order of distances is known");
+    let meaning = Meaning::Disparity { min: 0.0, max: 1.0 };
+    Ok(Some(EmbeddedDepth { kind: "HEIC", map, meaning, is_metric: false, focus: None, original: None }))
 }
 
 /// Returns whether a file begins as a PNG or JPEG does.
