@@ -140,7 +140,7 @@ pub(super) fn read_photo(path: &Path, request: &OpenRequest) -> Result<ReadPhoto
 impl ReadPhoto {
     /// Takes the depth inside the photo `path`, and notes what of it is used.
     fn take_inside(&mut self, path: &Path, inside: DepthInside) {
-        let DepthInside { depth, original, focus, kind } = inside;
+        let DepthInside { depth, original, original_in_srgb, focus, kind } = inside;
         let (name, findings) = (path.display(), &mut self.findings);
         findings.notes.extend(depth.notes.iter().map(|note| format!("{name}: {note}")));
         findings.depth_by = Some(format!("{name} itself ({kind})"));
@@ -153,8 +153,9 @@ impl ReadPhoto {
             };
             let note = format!("{name}: the original before the phone's own blur is inside, and is used{size}");
             findings.notes.push(note);
-            self.color = Arc::new(original);
-            findings.original = Some(Arc::clone(&self.color));
+            let original = Arc::new(original);
+            self.color = original_in_srgb.map_or_else(|| Arc::clone(&original), Arc::new);
+            findings.original = Some(original);
         }
         findings.focus = focus.map(|focus| match focus {
             Focus::Point { x, y } => FocusRule::Point { x: x.clamp(0.0, 1.0), y: y.clamp(0.0, 1.0) },

@@ -10,7 +10,7 @@ use crate::recording::coded::{self, EncodedPicture};
 use crate::recording::embedded::{self, EmbeddedDepth, Focus};
 use crate::recording::fault::PictureFault;
 use crate::recording::upright::upright;
-use crate::recording::{PhotoMetadata, RecordingError, decode};
+use crate::recording::{PhotoMetadata, RecordingError, color_space, decode};
 use bokehcam::frame::{ColorImage, DepthMap};
 
 /// A photo with its own depth.
@@ -19,8 +19,10 @@ pub struct DepthInside {
     /// Its depth; distances without a unit are [`Distances::Relative`], but their ratios are those of the scene, and the
     /// nearest (but for 1 %) is [`DepthMap::SUBJECT_M`].
     pub depth: DepthFile,
-    /// The picture before the phone's own blur, upright, if it is there.
+    /// The picture before the phone's own blur, upright, if it is there, in its own colour space: that of the photo.
     pub original: Option<ColorImage>,
+    /// The same as it is shown, in sRGB, if its own colour space is another one.
+    pub original_in_srgb: Option<ColorImage>,
     /// The focus that the photo was taken with: a point as fractions of width and height, or a distance in the units of
     /// the depth.
     pub focus: Option<Focus>,
@@ -70,12 +72,17 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
     file.map.metres.iter_mut().for_each(|metres| *metres *= scale);
 
     let views = [color, file.map.size()];
-    let original = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation, views) {
+    let decoded = original.as_deref().and_then(|bytes| match decode_original(bytes, orientation, views) {
         Ok(original) => Some(original),
         Err(what) => {
             file.notes.push(format!("the original picture inside ({kind}) is left out: {what}"));
             None
         }
+    });
+    let (original, profile) = decoded.unzip();
+    let original_in_srgb = original.as_ref().zip(profile.flatten()).and_then(|(original, profile)| {
+        let mut shown = original.clone();
+        color_space::convert_to_srgb(&profile, &mut shown.rgb).then_some(shown)
     });
     let color = original.as_ref().map_or(color, ColorImage::size);
     fit::fit_to(&mut file, None, color).map_err(|fault| broken("the map", &fault))?;
@@ -83,14 +90,17 @@ fn read(path: &Path, color: (u32, u32)) -> Result<Option<DepthInside>, PictureFa
         Focus::Point { x, y } => turn_point(x, y, orientation),
         Focus::Distance(distance) => Focus::Distance(distance * scale),
     });
-    Ok(Some(DepthInside { depth: file, original, focus, kind }))
+    Ok(Some(DepthInside { depth: file, original, original_in_srgb, focus, kind }))
 }
+
+/// An original in its own colour space, and the profile of that.
+type Original = (ColorImage, Option<Vec<u8>>);
 
 /// Decodes the original, and turns it as its own tag says, or else as the photo's does.
 ///
 /// # Errors
 /// Returns, in words, that it is damaged, or has the view of neither the photo nor the map (columns, rows).
-fn decode_original(bytes: &[u8], orientation: Orientation, views: [(u32, u32); 2]) -> Result<ColorImage, String> {
+fn decode_original(bytes: &[u8], orientation: Orientation, views: [(u32, u32); 2]) -> Result<Original, String> {
     let mut original = ColorImage::default();
     let decode = |into| decode::decode_stored_color(EncodedPicture::open_bytes(bytes)?, &mut Vec::new(), into);
     let mut metadata: PhotoMetadata = decode(&mut original).map_err(|fault: PictureFault| fault.to_string())?;
@@ -99,7 +109,7 @@ fn decode_original(bytes: &[u8], orientation: Orientation, views: [(u32, u32); 2
     // Of a photo that an editor has cropped, original and map still belong together.
     let [size, photo, map] = [original.size(), views[0], views[1]];
     match views.iter().any(|view| fit::has_same_view(*view, size)) {
-        true => Ok(original),
+        true => Ok((original, metadata.icc_profile)),
         false => Err(format!(
             "its {}x{} pixels have another aspect ratio than the photo ({}x{}) and its depth ({}x{})",
             size.0, size.1, photo.0, photo.1, map.0, map.1

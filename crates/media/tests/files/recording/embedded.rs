@@ -1,5 +1,6 @@
 //! Depth inside photos.
 
+mod colors;
 mod containers;
 mod damage;
 
