@@ -81,6 +81,29 @@ fn a_heic_picture_with_depth_inside_is_itself_and_shown_in_srgb() {
 }
 
 #[test]
+fn of_several_pictures_the_primary_one_is_converted() {
+    let home = home();
+    write_color(&home.path("other.png"), &ColorImage::new(20, 10), false).unwrap();
+    let script = "to=$(dirname \"$3\"); cp other.png $to/picture-1.png; cp shot.png $to/picture-2.png";
+    home.add_program("heif-convert", script);
+    for (listed, size, is_said) in [
+        (
+            "echo 'image: 20x10 (id=1)'; echo '  depth channel: no'; echo 'image: 40x30 (id=2), primary'",
+            (40, 30),
+            false,
+        ),
+        ("echo 'image: 20x10 (id=1), primary'; echo 'image: 40x30 (id=2)'", (20, 10), false),
+        ("exit 1", (20, 10), true),
+    ] {
+        let path = home.add_program("heif-info", listed);
+        let arguments = ["render", "in.heic", "--effect", "none", "--out", "out.png", "--force"];
+        let ran = Ran::of(home.command(&arguments).env("PATH", &path));
+        assert_eq!(ran.warning().contains("in.heic: it holds several pictures"), is_said, "{listed}: {}", ran.stderr);
+        assert_eq!(read_color(&home.path("out.png")).unwrap().size(), size, "{listed}");
+    }
+}
+
+#[test]
 fn without_the_program_its_package_is_named() {
     let home = home();
     let said = ["in.heic: it is a HEIC picture", "heif-convert (package libheif-examples)", "IN.heic OUT.png"];

@@ -17,9 +17,11 @@ use super::fault::PictureFault;
 use super::file_kind::{self, FileKind};
 use super::photo_metadata::PhotoMetadata;
 use bokehcam_files::guardian::Guardian;
-use bokehcam_files::process::Process;
+use bokehcam_files::process::{self, Process};
 
 const PROGRAM: &str = "heif-convert";
+/// Lists the pictures of a file; of the same package.
+const LISTING_PROGRAM: &str = "heif-info";
 /// Time after which the program counts as hung; the largest pictures take some seconds.
 const TIMEOUT: Duration = Duration::from_secs(60);
 /// The name of the converted picture. Several pictures are numbered, `picture-1.png`, and each one's depth is
@@ -48,8 +50,9 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
     let folder = TempDir::with_prefix("bokehcam-")?;
     let mut guardian = Guardian::start(folder.path()).ok();
     // An absolute path is no option, whatever its name.
+    let path = path.canonicalize()?;
     let mut command = Command::new(program);
-    command.arg("--with-aux").arg(path.canonicalize()?).arg(folder.path().join(PICTURE));
+    command.arg("--with-aux").arg(&path).arg(folder.path().join(PICTURE));
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut process = Process::start(&mut command, &Arc::default()).map_err(|error| match error.kind() {
         ErrorKind::NotFound => FileKind::fault(Some(file_kind::HEIC), ""),
@@ -60,20 +63,20 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
     let ended = process.wait_at_most(TIMEOUT)?;
     guard(None);
     let status = ended.status.ok_or_else(|| PictureFault::Damaged(format!("{PROGRAM} hung, and was killed")))?;
-    let files: Vec<_> = fs::read_dir(folder.path())?.flatten().map(|entry| entry.path()).collect();
-    let find = |suffixes: [&str; 2]| {
-        let ends = |path: &Path| {
-            path.file_stem()
-                .and_then(OsStr::to_str)
-                .is_some_and(|stem| suffixes.iter().any(|end| stem == format!("picture{end}")))
-        };
-        files.iter().find(|path| ends(path)).cloned()
+    let find = |ending: &str| {
+        let file = folder.path().join(format!("picture{ending}.png"));
+        file.is_file().then_some(file)
     };
-    match find(["", "-1"]) {
+    let ending = match (find(""), find("-2")) {
+        (None, Some(_)) => format!("-{}", read_primary_number(&path)),
+        (None, None) => "-1".to_owned(),
+        (Some(_), _) => String::new(),
+    };
+    match find(&ending) {
         Some(picture) if status.success() => {
             // The decoder reports a fault of the PNG.
             let _ = mark_upright(&picture);
-            let depth = find(["-depth", "-1-depth"]);
+            let depth = find(&format!("{ending}-depth"));
             Ok(Converted { picture, depth, _folder: folder, _guardian: guardian })
         }
         _ => {
@@ -81,6 +84,19 @@ fn convert_by(program: &OsStr, path: &Path) -> Result<Converted, PictureFault> {
             Err(PictureFault::Damaged(format!("{PROGRAM}: {}", last.unwrap_or("it left no picture"))))
         }
     }
+}
+
+/// Returns the number, from 1, of the primary picture of a file with several: the one that viewers show. Both programs
+/// list the pictures in the same order.
+fn read_primary_number(path: &Path) -> usize {
+    let listed = process::read_output_within(Command::new(LISTING_PROGRAM).arg(path), TIMEOUT).unwrap_or_default();
+    let mut pictures = listed.lines().filter(|line| line.starts_with("image: "));
+    let primary = pictures.position(|line| line.ends_with(", primary"));
+    if primary.is_none() {
+        let path = path.display();
+        tracing::warn!("{path}: it holds several pictures, and the first is used: {LISTING_PROGRAM} names no other");
+    }
+    primary.unwrap_or(0) + 1
 }
 
 /// Makes the EXIF of a converted PNG say that it is upright: a HEIC picture is turned by its properties alone (`irot`), and
