@@ -1,9 +1,11 @@
 //! Photos with all that their files hold: 16 bits, tone curves, transparency and metadata, from the file to the result.
 
+use std::io::Read;
 use std::path::Path;
 
 use super::coded::{self, EncodedPicture};
 use super::decode;
+use super::decoders::check_size;
 use super::encode::Raster;
 use super::fault::PictureFault;
 use super::photo_metadata::{SIXTEEN_BITS, TRANSPARENCY};
@@ -14,6 +16,10 @@ use super::{PhotoMetadata, RecordingError, color_space};
 use bokehcam::color::{Picture16, ToneCurves, round_to_8bit};
 use bokehcam::frame::ColorImage;
 use bokehcam::frame::transform::Transform;
+use bokehcam_files::input;
+
+/// Part of a HEIC file that has its properties, before the coded pictures.
+const MAX_HEIC_START_BYTES: u64 = 1 << 20;
 
 /// A photo, upright.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +54,20 @@ impl Photo {
         let orientation = photo.metadata.take_orientation();
         photo.transform(&upright(orientation));
         Ok(photo)
+    }
+
+    /// Returns columns and rows of the largest picture in a HEIC file as it is coded, before it is cut and turned; `None`
+    /// if the beginning of the file states none within the limits.
+    pub fn read_heic_size(path: &Path) -> Option<(u32, u32)> {
+        let mut start = Vec::new();
+        input::open(path).ok()?.take(MAX_HEIC_START_BYTES).read_to_end(&mut start).ok()?;
+        // The property `ispe` (ISO/IEC 23008-12, 6.5.3), of tiles, thumbnails and the whole.
+        let sizes = start.windows(16).filter_map(|bytes| {
+            let sides = bytes.strip_prefix(b"ispe\0\0\0\0")?.as_chunks::<4>().0;
+            let (width, height) = (u32::from_be_bytes(sides[0]), u32::from_be_bytes(sides[1]));
+            check_size(width, height).ok().map(|()| (width, height))
+        });
+        sizes.max_by_key(|&(width, height)| width * height)
     }
 
     /// Decodes a photo as it is stored; `codes` only with 16 bits, or other tone curves than sRGB's.

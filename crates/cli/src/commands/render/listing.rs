@@ -11,11 +11,15 @@ use crate::error::CliError;
 use crate::log;
 use bokehcam_files::place;
 use bokehcam_live::source::photo;
+use bokehcam_media::recording::Photo;
 use bokehcam_media::recording::still::{self, PhotoFormat};
 
 /// As in a shell: `*` neither matches a separator nor hidden files.
 const LIKE_A_SHELL: MatchOptions =
     MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
+
+/// Size of a picture whose header does not tell it: that of a large camera, as memory has to suffice.
+const UNKNOWN_PIXELS: u64 = 50_000_000;
 
 /// One of many pictures.
 #[derive(Debug)]
@@ -23,7 +27,7 @@ pub(super) struct Picture {
     pub path: PathBuf,
     /// File of the result.
     pub target: PathBuf,
-    /// Its size; 0 if it cannot be read.
+    /// Its size, or [`UNKNOWN_PIXELS`].
     pub pixels: u64,
 }
 
@@ -86,8 +90,9 @@ pub(super) fn list_pictures(
         }
     }
     let measure = |path: PathBuf| {
-        let (width, height) = still::read_size(&path).unwrap_or_default();
-        Picture { target: out.join(result_name(&path)), pixels: u64::from(width) * u64::from(height), path }
+        let size = still::read_size(&path).ok().or_else(|| Photo::read_heic_size(&path));
+        let pixels = size.map_or(UNKNOWN_PIXELS, |(width, height)| u64::from(width) * u64::from(height));
+        Picture { target: out.join(result_name(&path)), pixels, path }
     };
     Ok(paths.into_iter().map(measure).collect())
 }

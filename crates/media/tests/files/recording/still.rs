@@ -3,6 +3,7 @@
 use std::fs;
 
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam_media::recording::Photo;
 use bokehcam_media::recording::still::{
     read_aperture, read_color, read_depth, read_grey, read_photo, write_color, write_depth, write_photo,
 };
@@ -275,6 +276,26 @@ fn profile_and_exif_go_with_the_picture() {
     DynamicImage::from(wide).save(path("wide.png")).unwrap();
     assert_eq!(read_photo(&path("wide.png")).unwrap().1.lost_properties, ["transparency", "16 bits a channel"]);
     assert!(read_photo(&path("in.png")).unwrap().1.lost_properties.is_empty());
+}
+
+#[test]
+fn the_size_of_a_heic_picture_is_the_largest_that_it_states() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("a.heic");
+    let property = |(width, height): (u32, u32)| {
+        [&b"\0\0\0\x14ispe\0\0\0\0"[..], &width.to_be_bytes(), &height.to_be_bytes()].concat()
+    };
+    for (sizes, expected) in [
+        (&[][..], None),
+        (&[(512, 512), (4032, 3024), (320, 240)], Some((4032, 3024))),
+        // One beyond the limits.
+        (&[(64, 48), (u32::MAX, u32::MAX)], Some((64, 48))),
+    ] {
+        let properties: Vec<u8> = sizes.iter().copied().flat_map(property).collect();
+        fs::write(&path, [&b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..], &properties].concat()).unwrap();
+        assert_eq!(Photo::read_heic_size(&path), expected);
+    }
+    assert_eq!(Photo::read_heic_size(&dir.path().join("none.heic")), None);
 }
 
 #[test]
