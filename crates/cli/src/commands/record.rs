@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::error::CliError;
 use crate::files::refuse_overwriting_source;
+use crate::log;
 use crate::options;
 use crate::settings::layers::GivenSettings;
 use crate::settings::unused;
@@ -105,7 +106,8 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &GivenSetti
     }
 }
 
-/// Opens the source, and warns of settings without effect on it.
+/// Opens the source, prints what was assumed about it, and warns of settings without effect on it and of distances that are
+/// no metres.
 fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source, CliError> {
     let options = Options {
         frames: command.frames.clone(),
@@ -125,6 +127,13 @@ fn open_source(command: &RecordCommand, given: &GivenSettings) -> Result<Source,
     if source.rig.is_some_and(|rig| !rig.metric) {
         tracing::warn!(
             "the distance between the two cameras is not known: the metres of this depth are based on an assumed one"
+        );
+    }
+    source.findings.notes.iter().for_each(|note| log::note(note));
+    if source.depth_from.is_relative() {
+        tracing::warn!(
+            "this depth is relative: the metres of the recording tell only the order of distances; if depth pictures \
+             hold distances, add --depth-unit metres; else focus the recording by a point, such as --focus 0.5,0.4"
         );
     }
     Ok(source)

@@ -279,6 +279,18 @@ fn depth_that_a_wrong_scale_makes_is_doubted() {
 }
 
 #[test]
+fn what_is_assumed_about_a_source_is_said() {
+    let home = Home::new();
+    write_color(&home.path("photo.png"), &noise(64, 48), false).unwrap();
+    image::GrayImage::from_fn(64, 48, |x, _| [(4 * x) as u8].into()).save(home.path("photo-depth.png")).unwrap();
+    let ran = home.run(&["record", "photo.png", "--depth-unit", "inverse", "--to", "new"]);
+    for said in ["warning: this depth is relative", "note: photo-depth.png: the largest values are taken as near"] {
+        assert!(ran.done().contains(said), "{}", ran.stderr);
+    }
+    assert_eq!(read(&home.path("new")).0, 1);
+}
+
+#[test]
 fn a_recording_of_a_kinect_is_recorded_played_and_taken_for_depth() {
     const TAKE: &[u8] = include_bytes!("../../../../fuzz/seeds/recording_file/kinect.mkv");
     let home = Home::new();
