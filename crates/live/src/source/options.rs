@@ -106,6 +106,7 @@ impl Depth {
     /// Describes the options of depth maps that have no effect, as depth is `what`; `None` if there are none.
     pub fn describe_unused(&self, what: &str) -> Option<String> {
         let given = [
+            (self.depth_invalid != 0, "--depth-invalid"),
             (self.depth_unit.is_some(), "--depth-unit"),
             (self.depth_invert, "--depth-invert"),
             (self.depth_fit.is_some(), "--depth-fit"),
@@ -300,6 +301,14 @@ pub fn parse_seconds(text: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn options_of_depth_maps_without_effect_are_named() {
+        let depth = Depth { depth_invalid: 20, depth_invert: true, ..Depth::default() };
+        let said = "without effect here: --depth-invalid, --depth-invert (depth is that of a mask)";
+        assert_eq!(depth.describe_unused("that of a mask").as_deref(), Some(said));
+        assert_eq!(Depth::default().describe_unused("that of a mask"), None);
+    }
 
     #[test]
     fn wrong_sizes_say_what_is_accepted() {
