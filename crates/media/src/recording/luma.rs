@@ -7,6 +7,7 @@ use super::decode::Scratch;
 use super::fault::PictureFault;
 use super::photo_metadata::PhotoMetadata;
 use super::samples::{GREY_TOLERANCE, MAX_COLORED};
+use super::upright::upright;
 use bokehcam::color::luminance;
 use bokehcam::frame::DepthMap;
 
@@ -34,14 +35,16 @@ pub(super) fn read_inverse_depth(
 }
 
 /// Decodes to width, height and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
-/// by alpha if there is one.
+/// by alpha if there is one. The picture is upright by its orientation tag.
 pub(super) fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
     let mut scratch = Scratch::default();
     let coded = EncodedPicture::open(path, &mut scratch.file)?;
-    let (width, height) = coded.size();
-    let mut grey = vec![0.0; width as usize * height as usize];
-    decode_luma(coded, &mut scratch.pixels, |at, pixel| grey[at] = pixel.luma * pixel.alpha)?;
-    Ok((width, height, grey))
+    let size = coded.size();
+    let mut grey = vec![0.0; size.0 as usize * size.1 as usize];
+    let mut metadata = decode_luma(coded, &mut scratch.pixels, |at, pixel| grey[at] = pixel.luma * pixel.alpha)?;
+    let transform = upright(metadata.take_orientation());
+    let (width, height) = transform.rotated_size(size);
+    Ok((width, height, if transform.is_identity() { grey } else { transform.apply_to_pixels(&grey, size) }))
 }
 
 /// A pixel as stored (not linearised), 0 to 1.

@@ -5,6 +5,7 @@ use std::path::Path;
 use bokehcam::frame::Mask;
 use bokehcam_media::recording::RecordingError;
 use bokehcam_media::recording::mask_file::{self, MaskFile};
+use bokehcam_media::recording::still::read_grey;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::metadata::Orientation;
@@ -61,8 +62,13 @@ fn a_mask_is_turned_by_its_orientation_tag() {
             std::fs::write(&path, file).unwrap();
             let MaskFile { mask, notes } = read(&path).unwrap();
             assert_eq!((mask.width, mask.height, notes.len()), (SIZE.0, SIZE.1, 0), "{name} {tag}");
-            let worst = mask.alpha.iter().zip(alphas(&upright)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(worst < 0.05, "{name} {tag}: {worst}");
+            // So is a picture of an aperture.
+            let (width, height, grey) = read_grey(&path).unwrap();
+            assert_eq!((width, height), SIZE, "{name} {tag}");
+            for found in [mask.alpha, grey] {
+                let worst = found.iter().zip(alphas(&upright)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                assert!(worst < 0.05, "{name} {tag}: {worst}");
+            }
         }
     }
 }
