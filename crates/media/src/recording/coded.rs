@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-use image::codecs::{gif::GifDecoder, pnm::PnmDecoder, webp::WebPDecoder};
+use image::codecs::{bmp::BmpDecoder, gif::GifDecoder, pnm::PnmDecoder, webp::WebPDecoder};
 use image::metadata::Orientation;
 use image::{AnimationDecoder, ColorType, ImageDecoder, ImageFormat};
 use tiff::tags::Tag;
@@ -36,8 +36,8 @@ const MAX_EXIF_START_BYTES: u64 = 256 << 10;
 pub(super) enum EncodedPicture<'a> {
     /// Decoded straight from disk.
     Png(Box<png::Reader<BufReader<File>>>),
-    /// Decoded at once: a JPEG or another format.
-    Whole(Box<dyn ImageDecoder + 'a>),
+    /// Decoded at once: a JPEG or another format; with the colour of the number 0 in its palette, if it has one.
+    Whole(Box<dyn ImageDecoder + 'a>, Option<[u8; 3]>),
 }
 
 impl<'a> EncodedPicture<'a> {
@@ -54,9 +54,14 @@ impl<'a> EncodedPicture<'a> {
                 let ((width, height), _) = jpeg::read_header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
-                Self::Whole(create_jpeg_decoder(memory)?)
+                Self::Whole(create_jpeg_decoder(memory)?, None)
             }
-            Some(FileKind::Other(format)) => Self::Whole(create_decoder(file, format)?),
+            Some(FileKind::Other(format)) => {
+                let bmp = (format == ImageFormat::Bmp).then(|| BmpDecoder::new(BufReader::new(&file)).ok());
+                let background = bmp.flatten().and_then(|bmp| bmp.get_palette()?.first().copied());
+                file.rewind()?;
+                Self::Whole(create_decoder(file, format)?, background)
+            }
             Some(file_kind::HEIC) => match open_detected(&heif::convert(path)?.picture)? {
                 // The file stays open after its folder is removed.
                 (file, Some(FileKind::Png)) => Self::open_png(file)?,
@@ -77,7 +82,7 @@ impl<'a> EncodedPicture<'a> {
             Some(FileKind::Jpeg) => create_jpeg_decoder(bytes),
             kind => Err(FileKind::fault(kind, "PNG or JPEG")),
         });
-        decoder.map(Self::Whole)
+        decoder.map(|decoder| Self::Whole(decoder, None))
     }
 
     fn open_png(file: File) -> Result<Self, PictureFault> {
@@ -88,21 +93,25 @@ impl<'a> EncodedPicture<'a> {
     pub(super) fn icc_profile(&mut self) -> Option<Vec<u8>> {
         match self {
             Self::Png(reader) => color_space::of_png(reader.info()),
-            Self::Whole(decoder) => guard(|| Ok(photo_metadata::profile_of(&mut **decoder))).ok().flatten(),
+            Self::Whole(decoder, _) => guard(|| Ok(photo_metadata::profile_of(&mut **decoder))).ok().flatten(),
         }
     }
 
-    /// Returns the colour of the number 0 in the palette of a PNG, as RGB; `None` without a palette.
+    /// Returns the colour of the number 0 in the palette of a PNG or BMP, as RGB; `None` without a palette.
     pub(super) fn palette_background(&self) -> Option<[u8; 3]> {
-        let Self::Png(reader) = self else { return None };
-        let palette = reader.info().palette.as_deref().filter(|_| reader.info().color_type == png::ColorType::Indexed);
-        palette?.first_chunk().copied()
+        match self {
+            Self::Png(reader) if reader.info().color_type == png::ColorType::Indexed => {
+                reader.info().palette.as_deref()?.first_chunk().copied()
+            }
+            Self::Png(_) => None,
+            Self::Whole(_, background) => *background,
+        }
     }
 
     pub(super) fn size(&self) -> (u32, u32) {
         match self {
             Self::Png(reader) => reader.info().size(),
-            Self::Whole(decoder) => decoder.dimensions(),
+            Self::Whole(decoder, _) => decoder.dimensions(),
         }
     }
 
@@ -112,7 +121,7 @@ impl<'a> EncodedPicture<'a> {
                 let (color, depth) = reader.output_color_type();
                 SampleFormat { channels: color.samples(), is_16bit: depth == png::BitDepth::Sixteen }
             }
-            Self::Whole(decoder) => sample_format(decoder.color_type()),
+            Self::Whole(decoder, _) => sample_format(decoder.color_type()),
         }
     }
 
@@ -120,7 +129,7 @@ impl<'a> EncodedPicture<'a> {
     /// caller checks that the samples are 8-bit RGB.
     pub(super) fn decode_rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<PhotoMetadata, PictureFault> {
         match self {
-            Self::Whole(mut decoder) if decoder.color_type() == ColorType::Rgb8 => guard(|| {
+            Self::Whole(mut decoder, _) if decoder.color_type() == ColorType::Rgb8 => guard(|| {
                 let metadata = PhotoMetadata::from_decoder(&mut *decoder);
                 decoder.read_image(into).map_err(decoder_fault)?;
                 Ok(metadata)
@@ -167,7 +176,7 @@ impl<'a> EncodedPicture<'a> {
                 let _ = reader.finish();
                 Ok(PhotoMetadata::from_png(reader.info()))
             }
-            Self::Whole(mut decoder) => {
+            Self::Whole(mut decoder, _) => {
                 let metadata = PhotoMetadata::from_decoder(&mut *decoder);
                 let is_16bit = sample_format(decoder.color_type()).is_16bit;
                 memory.resize(width * height * bytes_per_pixel, 0);

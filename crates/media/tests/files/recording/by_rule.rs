@@ -8,7 +8,8 @@ use bokehcam::frame::ColorImage;
 use bokehcam_media::recording::depth_file::{self, Distances, Options};
 use bokehcam_media::recording::still::{PhotoFormat, read_color, write_photo};
 use bokehcam_media::recording::{Photo, PhotoMetadata, mask_file};
-use image::{ImageBuffer, Luma, Rgba, RgbaImage};
+use image::codecs::bmp::BmpEncoder;
+use image::{ExtendedColorType, ImageBuffer, Luma, Rgba, RgbaImage};
 use moxcms::ColorProfile;
 use tempfile::TempDir;
 
@@ -311,7 +312,11 @@ fn masks_may_number_objects() {
     encoder.set_palette(vec![0, 0, 0, 128, 0, 0, 0, 128, 0]);
     encoder.write_header().unwrap().write_image_data(&numbers).unwrap();
     let palette = read(&path);
-    for file in [grey, palette] {
+    let (mut bytes, bright) = (Vec::new(), [[0, 0, 0], [250, 0, 0], [0, 128, 0]]);
+    let mut encoder = BmpEncoder::new(&mut bytes);
+    encoder.encode_with_palette(&numbers, 8, 4, ExtendedColorType::L8, Some(&bright[..])).unwrap();
+    fs::write(dir.path().join("mask.bmp"), bytes).unwrap();
+    for file in [grey, palette, read(&dir.path().join("mask.bmp"))] {
         assert_eq!(file.mask.alpha, expected);
         assert!(file.notes[0].contains("numbers objects"), "{:?}", file.notes);
     }
