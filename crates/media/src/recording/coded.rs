@@ -250,7 +250,7 @@ pub(super) fn read_orientation(path: &Path) -> Result<Orientation, PictureFault>
         Some(FileKind::Jpeg) => {
             let mut start = Vec::new();
             file.take(MAX_EXIF_START_BYTES).read_to_end(&mut start)?;
-            Ok(jpeg::find_exif(&start).and_then(of_exif))
+            Ok(bokehcam_jpeg::find_exif(&start).and_then(of_exif))
         }
         Some(FileKind::Other(format)) => Ok(create_decoder(file, format)?.orientation().ok()),
         _ => Ok(None),

@@ -7,9 +7,7 @@ use image::{ColorType, ImageDecoder, ImageFormat, ImageReader};
 
 use super::fault::{PictureFault, decoder_fault, png_fault};
 use super::file_kind::{self, FileKind};
-use super::jpeg;
 use super::samples::SampleFormat;
-use super::strict_jpeg::StrictJpeg;
 use super::tiff_directory::is_raw_tiff;
 use super::tiff_file::{TiffPhotoDecoder, Undecoded};
 use super::tiff_form::{SAVE_PHOTO, TiffForm};
@@ -69,10 +67,10 @@ pub(super) fn create_decoder(mut file: File, format: ImageFormat) -> Result<Box<
 /// Creates a decoder for a JPEG that begins as one, whose size is checked.
 pub(super) fn create_jpeg_decoder<'a>(file: &'a [u8]) -> Result<Box<dyn ImageDecoder + 'a>, PictureFault> {
     // The decoder would fill missing data with grey.
-    if !jpeg::is_complete(file) {
+    if !bokehcam_jpeg::is_complete(file) {
         return Err(PictureFault::Truncated);
     }
-    let decoder = StrictJpeg::new(file).map_err(decoder_fault)?;
+    let decoder = bokehcam_jpeg::StrictJpeg::new(file).map_err(decoder_fault)?;
     check_size(decoder.dimensions().0, decoder.dimensions().1)?;
     Ok(Box::new(decoder))
 }

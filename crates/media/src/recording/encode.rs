@@ -9,7 +9,7 @@ use png::text_metadata::ITXtChunk;
 
 use super::photo_metadata::PhotoMetadata;
 use super::unit::{self, MapUnit};
-use super::{image_resources, jpeg, jpeg_intervals, xmp};
+use super::{image_resources, xmp};
 use bokehcam::color::round_to_8bit;
 use bokehcam::frame::{ColorImage, DepthMap};
 
@@ -118,13 +118,13 @@ pub(super) fn encode_photo_jpeg(raster: &Raster, metadata: &PhotoMetadata, file:
         Ok(())
     };
     let (rgb, _) = raster.to_8bit();
-    jpeg_intervals::encode(&rgb, raster.size, JPEG_QUALITY, set_metadata, file)?;
+    bokehcam_jpeg::encode(&rgb, raster.size, JPEG_QUALITY, set_metadata, file)?;
     // Each goes before those inserted earlier.
     for part in metadata.image_resources.iter().flat_map(|all| all.rchunks(image_resources::MAX_SEGMENT_BYTES)) {
-        jpeg::insert_application_segment(file, 13, &[image_resources::JPEG_NAME, part].concat());
+        bokehcam_jpeg::insert_application_segment(file, 13, &[image_resources::JPEG_NAME, part].concat());
     }
     if let Some(packet) = &metadata.xmp {
-        jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
+        bokehcam_jpeg::insert_application_segment(file, 1, &[xmp::JPEG_NAME, packet.as_bytes()].concat());
     }
     Ok(())
 }

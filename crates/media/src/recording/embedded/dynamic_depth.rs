@@ -4,7 +4,6 @@
 
 use roxmltree::Node;
 
-use super::super::jpeg;
 use super::xmp::{self, DYNAMIC_DEPTH, Xmp};
 use super::{EmbeddedDepth, Found, Meaning, is_complete, is_picture};
 
@@ -82,7 +81,8 @@ fn find_picture<'a>(file: &'a [u8], items: &[Item], names: &[&str]) -> Option<Op
     let length = items[index].length;
     // The first item is the photo, which ends where it says itself.
     let first = items.first().filter(|_| index > 0)?;
-    let from_front = jpeg::find_end(file).map(|end| bytes(&items[1..index], end.saturating_add(first.padding)));
+    let from_front =
+        bokehcam_jpeg::find_end(file).map(|end| bytes(&items[1..index], end.saturating_add(first.padding)));
     // Other data may stand between the photo and the items.
     let from_back = file.len().checked_sub(bytes(&items[index..], 0));
     let candidates = [from_front, from_back].into_iter().flatten();

@@ -165,7 +165,7 @@ fn is_picture(file: &[u8]) -> bool {
 /// Returns whether a picture inside the file is whole, as far as its structure says.
 fn is_complete(picture: &[u8]) -> bool {
     match picture.starts_with(b"\xFF\xD8\xFF") {
-        true => super::jpeg::is_complete(picture),
+        true => bokehcam_jpeg::is_complete(picture),
         false => is_picture(picture) && picture.windows(4).any(|name| name == b"IEND"),
     }
 }

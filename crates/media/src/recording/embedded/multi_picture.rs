@@ -1,6 +1,5 @@
 //! The index of a Multi-Picture file: JPEGs one after the other (CIPA DC-007, section 5).
 
-use super::super::jpeg;
 use super::super::tiff_directory::TiffDirectories;
 use super::is_picture;
 
@@ -40,7 +39,7 @@ impl Listed<'_> {
 
 /// Returns the pictures of a JPEG after the first one.
 pub(super) fn pictures(file: &[u8]) -> impl Iterator<Item = Listed<'_>> {
-    let index = jpeg::segments(file).find_map(|(marker, start, content)| {
+    let index = bokehcam_jpeg::segments(file).find_map(|(marker, start, content)| {
         let index = content.strip_prefix(NAME).filter(|_| marker == APP2)?;
         read_entries(index).map(|entries| (entries, start + NAME.len()))
     });

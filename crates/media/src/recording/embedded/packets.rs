@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::io::Cursor;
 
-use super::super::{decoders, jpeg, xmp};
+use super::super::{decoders, xmp};
 use bokehcam::compute::catch_panic;
 
 /// Identifier at the start of a JPEG segment with a piece of Extended XMP. After it: GUID (32 bytes), length of the whole
@@ -50,7 +50,7 @@ impl<'a> Packets<'a> {
 
     fn read_jpeg(file: &'a [u8]) -> Self {
         let (mut packets, mut pieces) = (Vec::new(), Vec::new());
-        for (_, _, content) in jpeg::segments(file).filter(|(marker, ..)| *marker == APP1) {
+        for (_, _, content) in bokehcam_jpeg::segments(file).filter(|(marker, ..)| *marker == APP1) {
             if let Some(packet) = content.strip_prefix(xmp::JPEG_NAME).filter(|_| packets.len() < MAX_PACKETS) {
                 packets.push(Cow::Borrowed(packet));
             } else if let Some(piece) = content.strip_prefix(EXTENSION_NAME).and_then(Piece::parse) {

@@ -14,7 +14,7 @@ use super::PixelError;
 use crate::layout::Layout;
 use bokehcam::compute::catch_panic;
 use bokehcam::frame::ColorImage;
-use bokehcam_media::recording::jpeg_repair::repair_jpeg;
+use bokehcam_jpeg::repair_jpeg;
 
 /// Decodes JPEGs; keeps the buffer for the repaired file.
 #[derive(Debug, Default)]

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 
-use super::jpeg;
+use super::segments::{find_coded_data, set_height_and_restart_interval};
 use bokehcam::compute::thread_pool::{DisjointParts, ThreadPool, core_count};
 
 /// Smaller pictures are encoded as a whole, in a few milliseconds.
@@ -20,7 +20,10 @@ const ROWS_OF_BLOCKS: usize = 7;
 
 /// Appends a picture to `file`, which must be empty, as JPEG with the given quality. `prepare` sets the metadata of the
 /// encoder.
-pub(super) fn encode(
+///
+/// # Errors
+/// The encoder refuses the picture or its metadata.
+pub fn encode(
     rgb: &[u8],
     (width_px, height_px): (u32, u32),
     quality: u8,
@@ -52,13 +55,13 @@ pub(super) fn encode(
         parts.part(part)[0] = encoded.map(|()| coded);
     });
     let blocks = (ROWS_OF_BLOCKS * width.div_ceil(BLOCK_PX)) as u16;
-    jpeg::set_height_and_restart_interval(file, height as u16, blocks);
+    set_height_and_restart_interval(file, height as u16, blocks);
     for (index, coded) in others.into_iter().enumerate() {
         // The end marker (EOI) makes room for a restart marker (RSTn).
         file.truncate(file.len() - 2);
         file.extend([0xFF, 0xD0 + (index % 8) as u8]);
         let coded = coded?;
-        file.extend_from_slice(&coded[jpeg::find_coded_data(&coded)..]);
+        file.extend_from_slice(&coded[find_coded_data(&coded)..]);
     }
     Ok(())
 }
@@ -96,7 +99,7 @@ mod tests {
             )
             .unwrap();
             assert!(decode(&whole) == decode(&in_intervals), "{width}x{height}");
-            assert!(jpeg::is_complete(&in_intervals) && in_intervals.len() < whole.len() * 101 / 100 + 200);
+            assert!(crate::is_complete(&in_intervals) && in_intervals.len() < whole.len() * 101 / 100 + 200);
             assert!(in_intervals.windows(11).any(|name| name == b"ICC_PROFILE"), "metadata is kept");
         }
     }

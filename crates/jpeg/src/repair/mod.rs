@@ -61,6 +61,9 @@ pub enum Fault {
 }
 
 /// Writes the JPEG in `bytes` to `file`, repaired as above; returns its width and height.
+///
+/// # Errors
+/// It cannot be a complete picture.
 pub fn repair_jpeg(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
     let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
     let mut rest = strip_padding(&bytes[start + 2..]);

@@ -10,21 +10,25 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::jpeg;
-use super::jpeg_repair::{Fault, repair_jpeg};
+use super::repair::{Fault, repair_jpeg};
+use super::segments::find_end;
 
 /// The end marker (EOI).
 const END: [u8; 2] = [0xFF, 0xD9];
 
 /// Decodes a JPEG as [`JpegDecoder`] does, or fails if a part of the picture is missing or damaged.
-pub(super) struct StrictJpeg<'a> {
+pub struct StrictJpeg<'a> {
     /// Reads the header and the metadata.
     header: JpegDecoder<Cursor<&'a [u8]>>,
     file: &'a [u8],
 }
 
 impl<'a> StrictJpeg<'a> {
-    pub(super) fn new(file: &'a [u8]) -> ImageResult<Self> {
+    /// Reads the header of a file.
+    ///
+    /// # Errors
+    /// It is damaged, or of an unsupported kind.
+    pub fn new(file: &'a [u8]) -> ImageResult<Self> {
         Ok(Self { header: JpegDecoder::new(Cursor::new(file))?, file })
     }
 }
@@ -69,7 +73,7 @@ impl ImageDecoder for StrictJpeg<'_> {
         let color = self.color_type();
         decode(&repaired, color, into).map_err(|error| {
             // With zeros in place of an invalid code, the decoder goes on where data are only missing.
-            let end = jpeg::find_end(self.file).unwrap_or(self.file.len()).saturating_sub(END.len());
+            let end = find_end(self.file).unwrap_or(self.file.len()).saturating_sub(END.len());
             let padded = [&self.file[..end], &[0; 64], &END].concat();
             if decode(&padded, color, into).is_ok() { truncated() } else { damaged(error) }
         })
@@ -104,11 +108,11 @@ mod tests {
 
     /// The last one is progressive.
     const FILES: [&[u8]; 5] = [
-        include_bytes!("../../../../fuzz/seeds/picture/420.jpg"),
-        include_bytes!("../../../../fuzz/seeds/picture/444.jpg"),
-        include_bytes!("../../../../fuzz/seeds/picture/grey.jpg"),
-        include_bytes!("../../../../fuzz/seeds/picture/restart.jpg"),
-        include_bytes!("../../../../fuzz/seeds/picture/progressive.jpg"),
+        include_bytes!("../../../fuzz/seeds/picture/420.jpg"),
+        include_bytes!("../../../fuzz/seeds/picture/444.jpg"),
+        include_bytes!("../../../fuzz/seeds/picture/grey.jpg"),
+        include_bytes!("../../../fuzz/seeds/picture/restart.jpg"),
+        include_bytes!("../../../fuzz/seeds/picture/progressive.jpg"),
     ];
 
     #[test]
