@@ -1,6 +1,7 @@
 //! Recordings and single pictures: a written file is read back, and faults are reported.
 
 mod associations;
+mod by_name;
 mod by_rule;
 mod depth_files;
 mod embedded;

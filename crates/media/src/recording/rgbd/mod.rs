@@ -112,9 +112,7 @@ pub(super) fn from_pairs(
 
 /// Returns the encoding of depth, and a sentence about its unit.
 fn depth_format(scale: Scale, options: &Options) -> Result<(DepthFormat, String), RecordingError> {
-    // To give what is assumed anyway changes nothing: 65535 stays unknown.
-    let is_other = |given: &f32| !matches!(scale, Scale::Millimetres) || *given != Scale::MILLIMETRES_PER_M;
-    let scale_given = options.depth_unit.units_per_m().or(options.depth_scale).filter(is_other);
+    let scale_given = options.depth_unit.units_per_m().or(options.depth_scale);
     Ok(match (options.depth_unit, scale_given) {
         (DepthUnit::Inverse, _) => (DepthFormat::of_pictures(options, 1.0), "depth is relative".to_owned()),
         (_, Some(scale)) => {

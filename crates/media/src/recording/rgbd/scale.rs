@@ -43,7 +43,7 @@ pub(in crate::recording) struct StatedUnits {
 
 impl StatedUnits {
     fn millimetres(origin: &str) -> Self {
-        Self { per_m: Scale::MILLIMETRES_PER_M, invalid: Some(u16::MAX), are_assumed: true, origin: origin.to_owned() }
+        Self { per_m: 1000.0, invalid: Some(u16::MAX), are_assumed: true, origin: origin.to_owned() }
     }
 
     /// Returns a sentence about them, and the option that overrides them.
@@ -71,8 +71,6 @@ struct BopCamera {
 }
 
 impl Scale {
-    pub(super) const MILLIMETRES_PER_M: f32 = 1000.0;
-
     /// Returns the origin of the units in the recording `dir`, whose colour pictures are in `color`.
     pub(in crate::recording) fn of_folder(dir: &Path, color: &Path) -> Self {
         let file = |dir: &Path, name: &str| Some(dir.join(name)).filter(|file| file.is_file());

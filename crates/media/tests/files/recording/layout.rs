@@ -1,5 +1,6 @@
 //! The meaning of the lists: pairs, columns, times.
 
+use bokehcam_media::recording::depth_file::Fit;
 use bokehcam_media::recording::{Options, Unpaired};
 
 use super::{SIZE, Scene, assert_says, color_of, depth_of, times_ns};
@@ -149,15 +150,27 @@ fn depth_follows_the_scale_and_the_value_for_unknown() {
 }
 
 #[test]
-fn depth_may_have_fewer_pixels_of_the_same_view() {
+fn depth_has_any_number_of_pixels_of_the_same_view() {
     let scene = Scene::with_pairs(1);
     scene.color("rgb/0.png", (640, 480), 0);
     for size in [(640, 480), (320, 240), (160, 120), (213, 160), (100, 75)] {
         scene.depth("depth/0.png", size, 5000);
         assert_eq!(depth_of(&scene.open().unwrap(), 0).unwrap().size(), size);
     }
-    for size in [(1280, 960), (640, 481), (641, 480), (640, 360), (320, 180), (480, 640)] {
+    for size in [(1280, 960), (640, 481), (641, 480)] {
         scene.depth("depth/0.png", size, 5000);
+        let depth = depth_of(&scene.open().unwrap(), 0).unwrap();
+        assert_eq!((depth.size(), depth.metres[0]), ((640, 480), 1.0), "larger ones are reduced: {size:?}");
+    }
+    for size in [(640, 360), (320, 180), (480, 640), (640, 640)] {
+        scene.depth("depth/0.png", size, 5000);
+        for (fit, fitted) in
+            [(Fit::Stretch, size), (Fit::Crop, (size.0.min(size.1 * 4 / 3), size.1.min(size.0 * 3 / 4)))]
+        {
+            let options = Options { depth_fit: Some(fit), ..Options::default() };
+            let expected = (fitted.0.min(640), fitted.1.min(480));
+            assert_eq!(depth_of(&scene.open_with(&options).unwrap(), 0).unwrap().size(), expected, "{size:?} {fit:?}");
+        }
         let (width, height) = size;
         assert_says(
             depth_of(&scene.open().unwrap(), 0),

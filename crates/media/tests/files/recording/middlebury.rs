@@ -91,9 +91,9 @@ fn what_is_wrong_is_told() {
     let scene = with_pair();
     save_grey(&scene.path("im1.png"), (23, 16), 9);
     assert_says(right_of(&scene.open().unwrap(), 0), &["im1.png: the right picture is 23x16"]);
-    let tall = DisparityMap { width: 24, height: 17, px: vec![1.0; 24 * 17] };
+    let tall = DisparityMap { width: 24, height: 20, px: vec![1.0; 24 * 20] };
     write_disparity(&scene.path("disp0.pfm"), &tall, None, true).unwrap();
-    assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the depth map is 24x17", "24x16"]);
+    assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the depth map is 24x20", "24x16"]);
     fs::write(scene.path("disp0.pfm"), "Pf\n24 16\n-1\n").unwrap();
     assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the file ends before"]);
 }
