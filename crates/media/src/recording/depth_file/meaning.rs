@@ -28,6 +28,8 @@ enum Quantity {
 const MAX_PLAUSIBLE_M: f32 = 1000.0;
 /// Fraction of the pixels farther away that still counts as noise.
 const MAX_IMPLAUSIBLE: f32 = 0.005;
+/// Share of a range under which no camera sees: 26 cm of 16 bits in the default unit, and 2 cm of a metre.
+const NEAR: f32 = 0.02;
 /// Minimum occupied bins, of a histogram with 256, of a 16-bit map that was stretched to the full range.
 const STRETCHED: usize = 256 * 3 / 10;
 /// Number of different values of 8 bits from which on a map is no sketch of a few surfaces.
@@ -209,7 +211,7 @@ fn check_unclear(values: &Values) -> Option<&'static str> {
 fn fills(numbers: impl Iterator<Item = f32> + Clone, white: f32) -> bool {
     let share = |count: usize| count as f32 > MAX_IMPLAUSIBLE * numbers.clone().count() as f32;
     let (_, high) = range_of(numbers.clone());
-    let near = numbers.clone().filter(|&number| number > 0.0 && number < 0.05 * white).count();
+    let near = numbers.clone().filter(|&number| number > 0.0 && number < NEAR * white).count();
     (0.95 * white..=1.05 * white).contains(&high) && share(near)
 }
 
