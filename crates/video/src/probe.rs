@@ -46,6 +46,8 @@ pub struct VideoFile {
     pub assumed_matrix: Option<YcbcrMatrix>,
     /// Whether its pictures may be transparent.
     pub has_alpha: bool,
+    /// Whether its pictures are grey of more than 8 bits, as depth cameras' are.
+    pub is_deep_grey: bool,
     /// The decoder that reads their alpha, where the usual one does not.
     pub alpha_decoder: Option<&'static str>,
     /// Whether there is sound.
@@ -156,6 +158,7 @@ impl VideoFile {
             is_transport_stream: answer.format.format_name.as_deref() == Some("mpegts"),
             assumed_matrix: video.color_space.is_none().then(|| YcbcrMatrix::for_height(size.1)),
             has_alpha: video.has_alpha(),
+            is_deep_grey: video.pix_fmt.as_deref().is_some_and(|format| format.starts_with("gray1")),
             alpha_decoder: video.alpha_decoder(),
             has_sound: has("audio"),
             has_subtitles: has("subtitle"),
@@ -339,6 +342,7 @@ mod tests {
             is_transport_stream: false,
             assumed_matrix: None,
             has_alpha: false,
+            is_deep_grey: false,
             alpha_decoder: None,
             has_sound: false,
             has_subtitles: false,

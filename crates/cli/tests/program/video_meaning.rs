@@ -66,6 +66,10 @@ fn what_cannot_be_shown_as_it_is_is_told() {
     let ran = home.run(&["stream", "fields.mp4", "--effect", "none", "--to", "null"]);
     assert!(ran.done().contains("fields.mp4: interlaced pictures"), "{ran:?}");
 
+    let p3 = ["-color_primaries", "smpte432", "-color_trc", "bt709", "-colorspace", "bt709", "p3.mp4"];
+    make(&home, &[&source("testsrc=s=64x48:r=10:d=0.4")[..], &p3].concat());
+    let ran = home.run(&["stream", "p3.mp4", "--effect", "none", "--to", "null"]);
+    assert!(ran.done().contains("p3.mp4: colours of smpte432 are shown as those of BT.709"), "{ran:?}");
     make(&home, &[&source("testsrc=s=64x48:r=10:d=1")[..], &["colours.mp4"]].concat());
     make(
         &home,
@@ -131,4 +135,26 @@ fn title_and_sound_stay_where_the_file_holds_them() {
     make(&home, &[&source("testsrc=s=64x48:r=10:d=1")[..], &tags, &["silent.mp4"]].concat());
     home.run(&["stream", "silent.mp4", "--effect", "none", "--to", "silent-out.mp4"]).done();
     assert!(probe(&home, "format_tags=title", "silent-out.mp4").contains("A day"));
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn grey_of_more_than_8_bits_is_asked_about_as_depth() {
+    let home = Home::new();
+    let clip = |name: &'static str, format: &'static str| {
+        make(
+            &home,
+            &[&source("gradients=s=64x48:d=0.2:r=10")[..], &["-pix_fmt", format, "-c:v", "ffv1", name]].concat(),
+        );
+    };
+    clip("clip.mkv", "yuv420p");
+    clip("deep.mkv", "gray16le");
+    clip("grey.mkv", "gray");
+    let stream = |options: &[&str]| home.run(&[&["stream", "clip.mkv", "--to", "out/", "--force"], options].concat());
+    for unit in [&[][..], &["--depth-unit", "millimetres"]] {
+        let way_out = ["deep.mkv", "may be distances", "--depth MAPS --depth-unit millimetres"];
+        stream(&[&["--depth", "deep.mkv"], unit].concat()).failed(2, &way_out);
+    }
+    stream(&["--depth", "deep.mkv", "--depth-unit", "inverse"]).done();
+    stream(&["--depth", "grey.mkv"]).done();
 }

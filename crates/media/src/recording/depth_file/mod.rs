@@ -39,7 +39,7 @@ use values::{Samples, Values};
 const FORMATS: &str = "PNG, JPEG, TIFF, PFM, PGM, NPY, NPZ or EXR";
 
 /// Extensions of the files of depth maps. The first is that of snapshots.
-pub const EXTENSIONS: [&str; 11] = ["pfm", "png", "npy", "npz", "tiff", "tif", "exr", "jpg", "jpeg", "webp", "pgm"];
+pub const EXTENSIONS: [&str; 11] = ["pfm", "npy", "npz", "exr", "tiff", "tif", "png", "pgm", "webp", "jpg", "jpeg"];
 
 /// Largest file of floats: 8 bytes per pixel, and room for a header.
 const MAX_FLOATS_BYTES: u64 = 8 * MAX_PIXELS + (1 << 20);
