@@ -71,7 +71,7 @@ fn maps_that_were_stretched_and_then_scaled_in_size_are_asked_about() {
     let count = (width * height) as usize;
     // From `near` to `far`, of the full range.
     let ramp = |near: f32, far: f32| (0..count).map(move |k| near + (far - near) * k as f32 / (count - 1) as f32);
-    let mut read = |near: f32, far: f32| {
+    let read = |near: f32, far: f32| {
         let numbers: Vec<f32> = ramp(near, far).collect();
         fs::write(&array, npy("<f4", false, "16, 32", &bytes_of(&numbers))).unwrap();
         let codes: Vec<u16> = ramp(near, far).map(|number| (number * 65535.0).min(65535.0) as u16).collect();
