@@ -9,6 +9,7 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::look::Look;
 use bokehcam_live::capture::{Captured, FrameBuffers};
 use bokehcam_live::source::{DepthChoice, Frames, Options, Source, SourceName};
+use bokehcam_media::recording::DepthUnit;
 
 /// Twenty frames of 40 ms; the grey of each is twelve times its number.
 const GREYS: &str = "color=black:s=64x48:r=25:d=0.8,format=gray,geq=lum=12*N";
@@ -276,6 +277,7 @@ fn depth_in_a_second_video_belongs_to_the_frame_of_its_number() {
     let with = |depth: &Path, frames: Frames, inverted: bool| {
         let mut options = Options { frames, depth_choice: DepthChoice::Video(depth.to_owned()), ..Options::default() };
         options.depth.depth_invert = inverted;
+        options.depth.depth_unit = Some(DepthUnit::Inverse);
         play(&color, &options)
     };
     let expected_m = |number: u8| DepthMap::relative_to_metres(1.0 - 3000.0 * f32::from(number) / 65535.0);
