@@ -190,9 +190,9 @@ fn folders_give_each_picture_its_map_or_mask() {
     }
     let near_right = depth(64, 48, |x, _| if x < 32 { 4.0 } else { 0.8 });
     write_depth(&home.path("maps/a.pfm"), &near_right, 5000.0, false).unwrap();
-    write_depth(&home.path("maps/b-depth.png"), &near_right, 5000.0, false).unwrap();
+    write_depth(&home.path("maps/b_depth.png"), &near_right, 5000.0, false).unwrap();
     let mask = color(64, 48, |x, _| if x < 32 { [255; 3] } else { [0; 3] });
-    write_color(&home.path("masks/a-mask.png"), &mask, false).unwrap();
+    write_color(&home.path("masks/a_mask.png"), &mask, false).unwrap();
     write_color(&home.path("masks/b.png"), &mask, false).unwrap();
     write_color(&home.path("masks/b.jpg"), &mask, false).unwrap();
     for (option, dir, written, failures) in [

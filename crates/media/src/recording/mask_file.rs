@@ -18,7 +18,7 @@ use bokehcam::color::luminance;
 use bokehcam::frame::Mask;
 
 /// Suffixes of the masks of pictures, after the picture's stem.
-const SUFFIXES: [&str; 3] = ["-mask", ".mask", "_mask"];
+pub const SUFFIXES: [&str; 3] = ["-mask", ".mask", "_mask"];
 
 /// Largest code of a mask that numbers objects: far darker than any coverage that is meant.
 const MAX_LABEL: f32 = 31.0;

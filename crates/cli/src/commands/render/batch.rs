@@ -24,6 +24,8 @@ use bokehcam::depth::backdrop::Background;
 use bokehcam::look::Look;
 use bokehcam_files::place;
 use bokehcam_live::source::DepthChoice;
+use bokehcam_media::recording::mask_file;
+use bokehcam_media::recording::pictures::MAP_SUFFIXES;
 use bokehcam_media::recording::still::PhotoFormat;
 
 /// Peak memory per pixel of reading, blurring and encoding a picture.
@@ -72,8 +74,8 @@ pub(super) fn run(command: &RenderCommand, global: &Global, given: &GivenSetting
     let requested = request_look(command, given)?;
     let (depth, mask) = (command.depth_map.as_deref(), command.mask.as_deref());
     let maps = MapFolders {
-        depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &["-depth", ".depth", ""])).transpose()?,
-        mask: mask.map(|dir| MapFolder::read("--mask", dir, &["-mask", ".mask", ""])).transpose()?,
+        depth: depth.map(|dir| MapFolder::read("--depth-map", dir, &MAP_SUFFIXES)).transpose()?,
+        mask: mask.map(|dir| MapFolder::read("--mask", dir, &mask_file::SUFFIXES)).transpose()?,
     };
     let format = result_format(command, &requested.look)?;
     let pictures = list_pictures(&command.images, &command.out, format)?;

@@ -12,7 +12,7 @@ use bokehcam_files::place;
 pub(super) struct MapFolder<'a> {
     option: &'static str,
     dir: &'a Path,
-    /// What follows a picture's name.
+    /// What may follow a picture's name.
     suffixes: &'static [&'static str],
     by_stem: HashMap<OsString, Vec<PathBuf>>,
 }
@@ -42,7 +42,7 @@ impl<'a> MapFolder<'a> {
     /// The folder has no such file, or several.
     pub fn find(&self, picture: &Path) -> Result<PathBuf, CliError> {
         let stem = picture.file_stem().unwrap_or_default();
-        let files = self.suffixes.iter().find_map(|suffix| {
+        let files = self.suffixes.iter().chain(&[""]).find_map(|suffix| {
             let mut name = stem.to_owned();
             name.push(suffix);
             let others = self.by_stem.get(&name)?.iter().filter(|path| !place::paths_overlap(path, picture));

@@ -101,7 +101,7 @@ impl Meaning {
     /// Converts the numbers to depth.
     pub fn into_depth(self, values: Values, options: &Options) -> DepthFile {
         let range = options.range.or_else(|| self.range_of(&values, options));
-        let is_known = self.known(options.invalid.or(values.invalid));
+        let is_known = self.known(find_invalid(&values, options));
         let Self { quantity, distances, mut notes } = self;
         notes.splice(..0, values.notes);
         let (width, height) = values.size;
@@ -145,14 +145,12 @@ impl Meaning {
     /// Returns the test of whether a number is known.
     fn known(&self, invalid: Option<f32>) -> impl Fn(f32) -> bool + use<> {
         let is_inverse = self.quantity == Quantity::Inverse;
-        // In inverse depth 0 is the farthest, unless it is said to be unknown.
-        let invalid = invalid.filter(|&invalid| !is_inverse || invalid != 0.0);
         move |number| Some(number) != invalid && (number.is_finite() || !is_inverse)
     }
 
     /// Returns the numbers of relative depth between which it lies; `None` for depth in metres.
     pub fn range_of(&self, values: &Values, options: &Options) -> Option<(f32, f32)> {
-        let is_known = self.known(options.invalid.or(values.invalid));
+        let is_known = self.known(find_invalid(values, options));
         let known = || values.numbers.iter().copied().filter(|&number| is_known(number));
         match self.quantity {
             Quantity::Inverse => Some(range_of(known())),
@@ -162,6 +160,11 @@ impl Meaning {
             Quantity::Depth { .. } | Quantity::Disparity { .. } => None,
         }
     }
+}
+
+/// Returns the number that means unknown: the one given, unless it is 0, which is unknown anyway, or the one stated.
+fn find_invalid(values: &Values, options: &Options) -> Option<f32> {
+    options.invalid.filter(|&invalid| invalid != 0.0).or(values.invalid)
 }
 
 /// Returns the inverse depth that counts as the nearest, of known ones: a few outliers are nearer.

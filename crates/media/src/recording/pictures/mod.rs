@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::contents::{Contents, Layout, ListedFrame, Locator, PictureSource, RecordingFolder};
 use super::error::{RecordingError, Result};
 use super::fault::PictureFault;
-use super::folder::{Pictures, find_pictures, has_pictures};
+use super::folder::{Pictures, find_pictures, has_pictures, strip_suffix};
 use super::rgbd::{self, Scale};
 use super::{Options, decode, mask_file, timeline};
 use companions::stem_of;
@@ -140,7 +140,10 @@ fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
     let is_part = rgbd::COLOR_FOLDERS.contains(&name);
     let within = rgbd::DEPTH_FOLDERS.map(|folder| dir.join(folder));
     let beside = rgbd::DEPTH_FOLDERS.into_iter().filter(|_| is_part).map(|folder| parent.join(folder));
-    let named = [format!("{name}-depth"), format!("{name}_depth")].map(|folder| parent.join(folder));
+    // Of `NAME_rgb`, `NAME_depth` (RTAB-Map).
+    let base =
+        ["_rgb", "-rgb", "_color", "-color"].iter().find_map(|suffix| strip_suffix(name, suffix)).unwrap_or(name);
+    let named = [format!("{base}-depth"), format!("{base}_depth")].map(|folder| parent.join(folder));
     let mut folders = within.into_iter().chain(beside).chain(named);
     folders.find(|folder| has_pictures(folder, |_| true)).map(|folder| (folder, ""))
 }

@@ -3,7 +3,7 @@
 use std::fs;
 
 use bokehcam_media::recording::depth_file::{self, Distances, Options};
-use bokehcam_media::recording::mask_file;
+use bokehcam_media::recording::{Recording, mask_file};
 use image::{ImageBuffer, Luma};
 use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, colortype};
@@ -59,8 +59,10 @@ fn the_number_that_a_tiff_calls_unknown_is_unknown() {
     let mut picture = encoder.new_image::<colortype::Gray32Float>(4, 2).unwrap();
     picture.encoder().write_tag(Tag::Unknown(42113), "16 ").unwrap();
     picture.write_data(&NUMBERS).unwrap();
-    let metres = depth_file::read(&path, &Options::default(), MAP_PX).unwrap().map.metres;
-    assert_eq!(metres, NUMBERS.map(|metres| if metres == 16.0 { 0.0 } else { metres }));
+    for invalid in [None, Some(0.0)] {
+        let metres = depth_file::read(&path, &Options { invalid, ..Options::default() }, MAP_PX).unwrap().map.metres;
+        assert_eq!(metres, NUMBERS.map(|metres| if metres == 16.0 { 0.0 } else { metres }));
+    }
 }
 
 #[test]
@@ -138,6 +140,13 @@ fn depth_of_the_view_of_the_colour_camera_is_preferred() {
         scene.depth(&format!("{}/1.png", names[1]), SIZE, 2000);
         assert_eq!(depth_of(&scene.open().unwrap(), 0).unwrap().metres[0], 2.0, "{names:?}");
     }
+    // As RTAB-Map exports them.
+    let scene = folder();
+    ["map_rgb", "map_depth"].iter().for_each(|name| fs::create_dir(scene.path(name)).unwrap());
+    scene.color("map_rgb/1.png", SIZE, 9);
+    scene.depth("map_depth/1.png", SIZE, 2000);
+    let recording = Recording::open(&scene.path("map_rgb"), &Default::default()).unwrap();
+    assert_eq!(depth_of(&recording, 0).unwrap().metres[0], 2.0);
     for prefix in ["color_", "rgb_"] {
         let scene = folder();
         scene.color(&format!("{prefix}0001.png"), SIZE, 9);
