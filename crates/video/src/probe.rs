@@ -46,8 +46,8 @@ pub struct VideoFile {
     pub assumed_matrix: Option<YcbcrMatrix>,
     /// Whether its pictures may be transparent.
     pub has_alpha: bool,
-    /// Whether its pictures are grey of more than 8 bits, as depth cameras' are.
-    pub is_deep_grey: bool,
+    /// Whether its pictures are grey of 16 bits, as those of depth cameras are.
+    pub is_16bit_grey: bool,
     /// The decoder that reads their alpha, where the usual one does not.
     pub alpha_decoder: Option<&'static str>,
     /// Whether there is sound.
@@ -158,7 +158,7 @@ impl VideoFile {
             is_transport_stream: answer.format.format_name.as_deref() == Some("mpegts"),
             assumed_matrix: video.color_space.is_none().then(|| YcbcrMatrix::for_height(size.1)),
             has_alpha: video.has_alpha(),
-            is_deep_grey: video.pix_fmt.as_deref().is_some_and(|format| format.starts_with("gray1")),
+            is_16bit_grey: video.pix_fmt.as_deref().is_some_and(|format| format.starts_with("gray16")),
             alpha_decoder: video.alpha_decoder(),
             has_sound: has("audio"),
             has_subtitles: has("subtitle"),
@@ -342,7 +342,7 @@ mod tests {
             is_transport_stream: false,
             assumed_matrix: None,
             has_alpha: false,
-            is_deep_grey: false,
+            is_16bit_grey: false,
             alpha_decoder: None,
             has_sound: false,
             has_subtitles: false,

@@ -139,7 +139,7 @@ fn title_and_sound_stay_where_the_file_holds_them() {
 
 #[test]
 #[ignore = "needs ffmpeg"]
-fn grey_of_more_than_8_bits_is_asked_about_as_depth() {
+fn grey_of_16_bits_is_asked_about_as_depth() {
     let home = Home::new();
     let clip = |name: &'static str, format: &'static str| {
         make(

@@ -91,8 +91,8 @@ pub struct Depth {
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = parse_switch, hide_default_value = true)]
     pub depth_invert: bool,
-    /// Fit of a photo's depth map with another aspect ratio: stretch (both show the same view) or crop (the photo is the
-    /// middle of the map) [default: stretch up to 2 %, and squares]
+    /// Fit of a depth map with another aspect ratio: stretch (both show the same view) or crop (the picture is the middle
+    /// of the map) [default: stretch up to 2 %, and squares for a photo]
     #[arg(long, value_name = "HOW", value_parser = names::parse_name::<Fit>)]
     pub depth_fit: Option<Fit>,
     /// Position of the depth camera relative to the colour camera: TOML with the tables [depth] and [color] (width,

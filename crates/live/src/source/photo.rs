@@ -23,7 +23,7 @@ const COLOR: &str = "-color";
 const PHOTOS: [&str; 10] = ["jpg", "jpeg", "png", "webp", "tif", "tiff", "heic", "heif", "bmp", "gif"];
 
 /// Returns whether a file belongs to a photo beside it: a depth map by its name (`NAME-depth`, `NAME.depth` or
-/// `NAME_depth`, of any format) or another [companion](pictures::is_companion), the mask of a photo that is there (`NAME-mask` or `NAME.mask`), or the picture of a snapshot before the blur.
+/// `NAME_depth`, of any format) or another [companion](pictures::is_companion), the mask of a photo that is there (`NAME-mask`, `NAME.mask` or `NAME_mask`), or the picture of a snapshot before the blur.
 pub fn is_companion(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let is_original = || {

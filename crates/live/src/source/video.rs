@@ -131,10 +131,10 @@ pub(super) fn open_depth(
     {
         return Err(DepthError::from(VideoError::FrameCount { path: depth.path, frames, needed }).into());
     }
-    if depth.is_deep_grey && options.depth_unit != Some(DepthUnit::Inverse) && !options.depth_invert {
+    if depth.is_16bit_grey && options.depth_unit != Some(DepthUnit::Inverse) && !options.depth_invert {
         return SourceError::usage_error(format!(
-            "--depth {0}: grey of more than 8 bits may be distances, and a video states no unit; --depth-unit inverse takes \
-             it as relative, and for distances make maps: ffmpeg -i {0} MAPS/%06d.png, then --depth MAPS --depth-unit \
+            "--depth {0}: grey of 16 bits may be distances, and a video states no unit; --depth-unit inverse takes \
+             it as relative, and for distances make maps: ffmpeg -i {0} -fps_mode passthrough MAPS/%06d.png, then --depth MAPS --depth-unit \
              millimetres",
             file.display()
         ));

@@ -7,7 +7,7 @@ use image::metadata::Orientation;
 
 use super::contents::DepthFormat;
 use super::decode::{self, Scratch};
-use super::depth_file::has_same_view;
+use super::depth_file::{Fit, has_same_view};
 use super::error::{RecordingError, Result};
 use super::fault::{PictureFault, ReadResult};
 use super::upright::upright;
@@ -136,7 +136,7 @@ impl Recording {
                     DepthFormat::Inverse { white_is_far, invalid } => {
                         luma::read_inverse_depth(&path, (*white_is_far, *invalid), scratch, into)
                     }
-                    DepthFormat::Disparity(rig) => read_disparity(&path, rig, stored_size, into),
+                    DepthFormat::Disparity(rig) => read_disparity(&path, rig, self.depth_fit, stored_size, into),
                 };
                 if !turn.is_identity() {
                     *into = turn.transform_map(mem::take(into), stored_size);
@@ -148,10 +148,19 @@ impl Recording {
     }
 }
 
-/// Reads disparities, in pixels of the map, as depth. The rig is for the colour picture of `color` pixels.
-fn read_disparity(path: &Path, rig: &StereoRig, color: (u32, u32), into: &mut DepthMap) -> ReadResult {
+/// Reads disparities, in pixels of the map, as depth, which is fitted afterwards. The rig is for the colour picture of `color`
+/// pixels.
+fn read_disparity(
+    path: &Path,
+    rig: &StereoRig,
+    fit: Option<Fit>,
+    color: (u32, u32),
+    into: &mut DepthMap,
+) -> ReadResult {
     let map = depth_file::read_disparity(path)?;
-    let zoom = color.0 as f32 / map.width as f32;
+    let [across, down] = [color.0 as f32 / map.width as f32, color.1 as f32 / map.height as f32];
+    // What is cropped leaves the side that is not.
+    let zoom = if fit == Some(Fit::Crop) { across.max(down) } else { across };
     *into = map.to_depth_map(|px| rig.depth_m(px * zoom));
     Ok(())
 }

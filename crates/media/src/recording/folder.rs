@@ -2,13 +2,14 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::MAX_ENTRIES;
 use super::error::{RecordingError, Result};
 
-/// Least number of digits of seconds since 1970 in names.
-const SECONDS_DIGITS: usize = 9;
+/// Numbers of digits of seconds since 1970, up to the year 2286.
+const SECONDS_DIGITS: RangeInclusive<usize> = 9..=10;
 
 /// Endings of pictures.
 pub(super) const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "ppm", "pgm"];
@@ -86,7 +87,7 @@ fn natural_key(name: &str) -> String {
     let mut before = ["", ""];
     for run in split_digits(name) {
         let number = run.trim_start_matches('0');
-        let are_decimals = before[0].len() >= SECONDS_DIGITS && before[1] == ".";
+        let are_decimals = SECONDS_DIGITS.contains(&before[0].len()) && before[1] == ".";
         match run.starts_with(|c: char| c.is_ascii_digit()) {
             true if are_decimals => key.push_str(run),
             true => key.extend([&format!("{:03}", number.len()), number]),
@@ -277,7 +278,9 @@ mod tests {
         let times =
             ["1700000000.0.png", "1700000000.05.png", "1700000000.1.png", "1700000000.15.png", "1700000001.0.png"];
         assert_eq!(sorted(&[times[3], times[1], times[4], times[2], times[0]]), times);
-        assert_eq!(sorted(&["1.10", "1.9"]), ["1.9", "1.10"]);
+        for burst in [["1.9", "1.10"], ["20240115123000.2", "20240115123000.10"]] {
+            assert_eq!(sorted(&[burst[1], burst[0]]), burst);
+        }
         let long = "9".repeat(250);
         assert_eq!(sorted(&[&long, "10"]), ["10", &long]);
     }

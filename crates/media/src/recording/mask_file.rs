@@ -11,6 +11,7 @@ use super::depth_file::{describe_stretch, is_stretchable};
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::file_kind::FileKind;
+use super::folder::strip_suffix;
 use super::luma::{self, LumaPixel};
 use super::samples::{GREY_TOLERANCE, MAX_COLORED};
 use super::upright::upright;
@@ -34,7 +35,7 @@ pub struct MaskFile {
 
 /// Returns the stem of the picture whose mask has this stem by its name; `None` if it is no mask.
 pub fn picture_stem(stem: &str) -> Option<&str> {
-    SUFFIXES.iter().find_map(|suffix| stem.strip_suffix(suffix)).filter(|stem| !stem.is_empty())
+    SUFFIXES.iter().find_map(|suffix| strip_suffix(stem, suffix)).filter(|stem| !stem.is_empty())
 }
 
 /// Reads the mask of a picture of `color` (columns, rows) pixels, upright by its orientation tag, and scaled down to that
@@ -86,7 +87,7 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
     let (mut lowest, mut highest, mut brightest) = (1.0_f32, 0.0_f32, 0.0_f32);
     let (mut unequal, mut colored) = (0, 0);
     // The brightest but for white, which may be what is no object, and how many pixels have each.
-    let (mut object, mut objects, mut whites) = (0.0_f32, 0, 0);
+    let (mut object, mut objects, mut whites, mut blacks) = (0.0_f32, 0, 0, 0);
     // The decoder of PNM scales numbers: those of objects are the ones before.
     let white = coded::read_pnm_white(path).filter(|&white| white > 1.0).unwrap_or(samples.white());
     let is_white = |luma: f32| luma * white > white - 0.5;
@@ -102,6 +103,8 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
             whites += 1;
         } else if luma > 0.0 {
             (object, objects) = (object.max(luma), objects + 1);
+        } else {
+            blacks += 1;
         }
         unequal += usize::from(alpha - luma * alpha > GREY_TOLERANCE);
         colored += usize::from(is_colored && alpha > 0.0);
@@ -112,7 +115,9 @@ fn read_unfitted(path: &Path) -> Result<(Mask, Option<&'static str>), PictureFau
         () if background.is_some() && colored > 0 => Reading::Labels,
         // Compression makes such codes of black.
         () if !is_jpeg && (0.5..=MAX_LABEL).contains(&(brightest * white)) => Reading::Labels,
-        () if !is_jpeg && objects > whites && (0.5..=MAX_LABEL).contains(&(object * white)) => Reading::LabelsAndVoid,
+        () if !is_jpeg && blacks > 0 && objects > whites && (0.5..=MAX_LABEL).contains(&(object * white)) => {
+            Reading::LabelsAndVoid
+        }
         () => Reading::Luma,
     };
     let (stored, note) = match reading {

@@ -15,8 +15,8 @@ pub struct Options {
     pub depth_invert: bool,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
-    /// How depth maps of another aspect ratio than their pictures are fitted; `None` for those of nearly the same, and
-    /// squares, to be stretched.
+    /// How depth maps of another aspect ratio than their pictures are fitted; `None` stretches those of nearly
+    /// the same, and refuses others.
     pub depth_fit: Option<Fit>,
     /// The calibration of a depth camera that looks from another place than the colour camera, if the recording's depth
     /// is of its view; it replaces the recording's own.

@@ -8,6 +8,7 @@ use super::decode;
 use super::decoders::check_size;
 use super::encode::Raster;
 use super::fault::PictureFault;
+use super::file_kind;
 use super::photo_metadata::{SIXTEEN_BITS, TRANSPARENCY};
 use super::still::{PhotoFormat, photo_format, write_raster};
 use super::transparency::{fill_hidden, over_white};
@@ -54,6 +55,11 @@ impl Photo {
         let orientation = photo.metadata.take_orientation();
         photo.transform(&upright(orientation));
         Ok(photo)
+    }
+
+    /// Returns whether a file is a HEIC picture, by its first bytes.
+    pub fn is_heic(path: &Path) -> bool {
+        coded::read_kind(path) == Some(file_kind::HEIC)
     }
 
     /// Returns columns and rows of the largest picture in a HEIC file as it is coded, before it is cut and turned; `None`

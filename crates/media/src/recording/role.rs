@@ -10,6 +10,8 @@ pub(super) enum Role {
     /// The name says nothing.
     #[default]
     Unstated,
+    /// Pictures of infrared light.
+    Infrared,
     /// What is measured beside depth: normals, positions, motion, confidence, masks, infrared.
     Other,
 }
@@ -19,7 +21,7 @@ const OTHER: &str = "normal normals position positions motion velocity vector fl
 const DISPARITY: &str = "disp disparity disparities";
 const INVERSE: &str = "inv inverse invdepth idepth";
 const DEPTH: &str = "depth depths depthmap zdepth z pz distance distances";
-/// Yields to depth, which may be named after the infrared camera that has its view.
+/// Yields to depth, which may be named after the camera that has its view.
 const INFRARED: &str = "ir infra infrared";
 
 impl Role {
@@ -33,7 +35,7 @@ impl Role {
             () if has(DISPARITY) => Self::Disparity,
             () if has(INVERSE) => Self::InverseDepth,
             () if has(DEPTH) => Self::Depth,
-            () if has(INFRARED) => Self::Other,
+            () if has(INFRARED) => Self::Infrared,
             () => Self::Unstated,
         }
     }
@@ -85,8 +87,8 @@ mod tests {
             ("depth_confidence", Role::Other),
             ("depthNormals", Role::Other),
             ("00000_depth_mask", Role::Other),
-            ("image_ir_rect", Role::Other),
-            ("infra1", Role::Other),
+            ("image_ir_rect", Role::Infrared),
+            ("infra1", Role::Infrared),
             ("aligned_depth_to_infra1", Role::Depth),
             ("display", Role::Unstated),
             ("dispatcher_2", Role::Unstated),

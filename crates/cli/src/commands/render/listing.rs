@@ -18,7 +18,7 @@ use bokehcam_media::recording::still::{self, PhotoFormat};
 const LIKE_A_SHELL: MatchOptions =
     MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
 
-/// Size of a picture whose header does not tell it: that of a large camera, as memory has to suffice.
+/// Size of a HEIC picture whose header does not tell it: that of a large camera, as memory has to suffice.
 const UNKNOWN_PIXELS: u64 = 50_000_000;
 
 /// One of many pictures.
@@ -27,7 +27,7 @@ pub(super) struct Picture {
     pub path: PathBuf,
     /// File of the result.
     pub target: PathBuf,
-    /// Its size, or [`UNKNOWN_PIXELS`].
+    /// Its size; [`UNKNOWN_PIXELS`], or 0 if it cannot be read.
     pub pixels: u64,
 }
 
@@ -90,8 +90,10 @@ pub(super) fn list_pictures(
         }
     }
     let measure = |path: PathBuf| {
+        // A picture without a readable header fails before it takes memory, but for HEIC.
         let size = still::read_size(&path).ok().or_else(|| Photo::read_heic_size(&path));
-        let pixels = size.map_or(UNKNOWN_PIXELS, |(width, height)| u64::from(width) * u64::from(height));
+        let unknown = if Photo::is_heic(&path) { UNKNOWN_PIXELS } else { 0 };
+        let pixels = size.map_or(unknown, |(width, height)| u64::from(width) * u64::from(height));
         Picture { target: out.join(result_name(&path)), pixels, path }
     };
     Ok(paths.into_iter().map(measure).collect())

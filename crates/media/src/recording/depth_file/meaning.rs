@@ -162,7 +162,8 @@ impl Meaning {
     }
 }
 
-/// Returns the number that means unknown: the one given, unless it is 0, which is unknown anyway, or the one stated.
+/// Returns the number that means unknown: the one given, or the one stated; 0 is the default of what is given,
+/// and states nothing.
 fn find_invalid(values: &Values, options: &Options) -> Option<f32> {
     options.invalid.filter(|&invalid| invalid != 0.0).or(values.invalid)
 }
@@ -176,7 +177,8 @@ pub(super) fn nearest(mut inverse: Vec<f32>) -> Option<f32> {
 
 /// Returns what is wrong with numbers that would be taken as distances, as nothing else is stated.
 fn check_unclear(values: &Values) -> Option<&'static str> {
-    let known = || values.numbers.iter().copied().filter(|&number| number.is_finite());
+    let is_known = |number: &f32| number.is_finite() && Some(*number) != values.invalid;
+    let known = || values.numbers.iter().copied().filter(is_known);
     let (low, high) = range_of(known());
     match values.samples {
         Samples::Sixteen => {

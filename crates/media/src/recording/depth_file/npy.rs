@@ -169,7 +169,7 @@ pub(super) fn read_archive(file: File, max_bytes: u64) -> Result<Values, Picture
     let Some((_, (role, is_unnamed, _), index, stem)) = maps.first() else {
         return Err(first_fault.unwrap_or_else(|| PictureFault::NotAMap("an archive without arrays".to_owned())));
     };
-    if *role == Role::Other {
+    if matches!(role, Role::Infrared | Role::Other) {
         return Err(PictureFault::NotAMap(format!("an archive of {stem:?}, without an array of depth,")));
     }
     let member = archive.by_index(*index).map_err(zip_fault)?;

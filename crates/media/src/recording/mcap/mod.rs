@@ -111,7 +111,7 @@ fn open(folder: &RecordingFolder, options: &Options) -> Result<Contents, Recordi
         tracing::warn!("{name}: several topics have pictures: colour is taken from {color}{depth} (--topic)");
     }
     let other = found.topics.iter().find(|topic| topic.content(false) != topic.content(true));
-    if let Some(other) = other.filter(|_| depth.is_none()) {
+    if let Some(other) = other.filter(|_| depth.is_none() && options.topics.is_empty()) {
         tracing::warn!("{name}: {other} is no depth by its name; --topic {other} takes it as depth");
     }
     let registered = depth.filter(|_| options.depth_calibration.is_none());

@@ -84,7 +84,7 @@ impl Topic {
         match self.role() {
             _ if self.messages.is_empty() => None,
             Role::Disparity | Role::InverseDepth if is_depth => Some(Content::Disparity),
-            Role::Other if is_depth => is_chosen.then_some(Content::Depth),
+            Role::Infrared | Role::Other if is_depth => is_chosen.then_some(Content::Depth),
             Role::Depth | Role::Unstated if is_depth || encoding == "mono16" && self.name.contains("depth") => {
                 Some(Content::Depth)
             }
@@ -112,7 +112,10 @@ impl Topic {
     /// sees it.
     fn is_preferred(&self, content: Content) -> bool {
         match content {
-            Content::Color => !self.format.starts_with("mono") && self.format != "8UC1" && self.role() != Role::Other,
+            Content::Color => {
+                let is_other = matches!(self.role(), Role::Infrared | Role::Other);
+                !self.format.starts_with("mono") && self.format != "8UC1" && !is_other
+            }
             _ => ["aligned", "registered"].iter().any(|word| self.name.contains(word)),
         }
     }

@@ -20,7 +20,8 @@ pub(in crate::recording) fn is_map(stem: &str) -> bool {
 pub fn is_companion(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // Names first: a header is a file to open.
-    is_map(&stem) || (Role::of_name(&stem) != Role::Unstated || has_color_twin(path)) && is_grey(path)
+    is_map(&stem)
+        || (!matches!(Role::of_name(&stem), Role::Unstated | Role::Infrared) || has_color_twin(path)) && is_grey(path)
 }
 
 /// Returns whether a file is the depth map of a picture beside it, by its name.

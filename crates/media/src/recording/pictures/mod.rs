@@ -1,6 +1,7 @@
 //! A folder of pictures without lists, in natural order of their names, or those of a pattern such as
 //! `DIR/IMG_%04d.jpg`. Depth maps may be beside them: named `NAME-depth`, `NAME.depth` or `NAME_depth`, or `NAME` with
-//! another ending and grey of 16 bits; in a folder `depth` or `depths` within or beside the folder, or in `DIR-depth`.
+//! another ending and grey of 16 bits; in a folder `aligned_depth`, `depth` or `depths` within or beside the folder, or in
+//! `DIR-depth`.
 //! Masks (`NAME-mask`) and what else belongs to pictures is left out.
 
 mod companions;
@@ -143,7 +144,8 @@ fn find_maps(dir: &Path) -> Option<(PathBuf, &'static str)> {
     // Of `NAME_rgb`, `NAME_depth` (RTAB-Map).
     let base =
         ["_rgb", "-rgb", "_color", "-color"].iter().find_map(|suffix| strip_suffix(name, suffix)).unwrap_or(name);
-    let named = [format!("{base}-depth"), format!("{base}_depth")].map(|folder| parent.join(folder));
+    let named = [name, base].map(|base| [format!("{base}-depth"), format!("{base}_depth")]);
+    let named = named.iter().flatten().map(|folder| parent.join(folder));
     let mut folders = within.into_iter().chain(beside).chain(named);
     folders.find(|folder| has_pictures(folder, |_| true)).map(|folder| (folder, ""))
 }

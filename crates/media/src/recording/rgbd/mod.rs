@@ -124,8 +124,7 @@ fn depth_format(scale: Scale, options: &Options) -> Result<(DepthFormat, String)
             // 0 is unknown anyway: it states nothing.
             let invalid = options.depth_invalid.filter(|&value| value != 0).or(stated.invalid);
             let units = DepthUnits { scale: stated.per_m, invalid };
-            let text = format!("depth has {} units per metre ({}; --depth-scale)", stated.per_m, stated.origin);
-            (DepthFormat::StatedUnits(units), text)
+            (DepthFormat::StatedUnits(units), format!("depth {}", stated.describe()))
         }
     })
 }

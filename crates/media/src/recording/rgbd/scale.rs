@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{LAYOUT, find_pair};
+use super::{DEPTH_FOLDERS, LAYOUT, find_pair};
 use crate::recording::error::RecordingError;
 use crate::recording::{LAYOUTS, pictures};
 use bokehcam_files::input;
@@ -101,7 +101,8 @@ impl Scale {
             // Other layouts, such as lists of both, come before.
             LAYOUTS.iter().find(|layout| (layout.matches)(dir)).filter(|layout| layout.name == LAYOUT.name)?;
             let [color, depth] = find_pair(dir)?;
-            let is_of_pair = dir.join(depth.folder) == folder;
+            let is_of_pair =
+                [depth.folder].into_iter().chain(DEPTH_FOLDERS.map(Path::new)).any(|of| dir.join(of) == folder);
             is_of_pair.then(|| Self::of_folder(dir, color.folder))
         })
     }

@@ -102,7 +102,10 @@ fn what_is_no_object_is_no_subject_of_a_mask() {
     let file = read();
     assert_eq!(file.mask.alpha, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0]);
     assert!(file.notes[0].contains("0 and white"), "{:?}", file.notes);
-    // A white subject with a little noise in the dark.
+    // A white subject before a dark wall is none of numbers.
+    write([20, 255, 20, 20, 20, 255, 20, 20]);
+    assert!(read().mask.alpha[1] > 0.99);
+    // Nor is one with a little noise in the dark.
     write([0, 255, 255, 255, 3, 255, 255, 255]);
     assert!(read().mask.alpha[1] > 0.99);
 }
@@ -133,6 +136,10 @@ fn depth_of_the_view_of_the_colour_camera_is_preferred() {
         scene.depth(&format!("aligned_depth/{n}.png"), SIZE, 2000);
     }
     assert_eq!(depth_of(&scene.open().unwrap(), 1).unwrap().metres[0], 2.0);
+    // A single map of the other folder has the scale of its recording, too.
+    let options = Options { invalid: Some(0.0), ..Options::default() };
+    scene.depth("depth/3.png", SIZE, 9000);
+    assert_eq!(depth_file::read(&scene.path("depth/3.png"), &options, SIZE).unwrap().map.metres[0], 9.0);
     for names in [["Color", "Depth"], ["RGB", "Depth"]] {
         let scene = folder();
         names.iter().for_each(|name| fs::create_dir(scene.path(name)).unwrap());
@@ -140,13 +147,16 @@ fn depth_of_the_view_of_the_colour_camera_is_preferred() {
         scene.depth(&format!("{}/1.png", names[1]), SIZE, 2000);
         assert_eq!(depth_of(&scene.open().unwrap(), 0).unwrap().metres[0], 2.0, "{names:?}");
     }
-    // As RTAB-Map exports them.
+    // As RTAB-Map exports them; a folder of the whole name has priority.
     let scene = folder();
-    ["map_rgb", "map_depth"].iter().for_each(|name| fs::create_dir(scene.path(name)).unwrap());
+    fs::create_dir(scene.path("map_rgb")).unwrap();
     scene.color("map_rgb/1.png", SIZE, 9);
-    scene.depth("map_depth/1.png", SIZE, 2000);
-    let recording = Recording::open(&scene.path("map_rgb"), &Default::default()).unwrap();
-    assert_eq!(depth_of(&recording, 0).unwrap().metres[0], 2.0);
+    for (name, units) in [("map_depth", 2000), ("map_rgb_depth", 3000)] {
+        fs::create_dir(scene.path(name)).unwrap();
+        scene.depth(&format!("{name}/1.png"), SIZE, units);
+        let recording = Recording::open(&scene.path("map_rgb"), &Default::default()).unwrap();
+        assert_eq!(depth_of(&recording, 0).unwrap().metres[0], f32::from(units) / 1000.0, "{name}");
+    }
     for prefix in ["color_", "rgb_"] {
         let scene = folder();
         scene.color(&format!("{prefix}0001.png"), SIZE, 9);
