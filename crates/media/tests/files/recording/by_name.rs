@@ -102,7 +102,7 @@ fn what_is_no_object_is_no_subject_of_a_mask() {
     let file = read();
     assert_eq!(file.mask.alpha, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0]);
     assert!(file.notes[0].contains("0 and white"), "{:?}", file.notes);
-    // A white subject before a dark wall is none of numbers.
+    // A white subject before a dark wall is a mask as any other.
     write([20, 255, 20, 20, 20, 255, 20, 20]);
     assert!(read().mask.alpha[1] > 0.99);
     // Nor is one with a little noise in the dark.
