@@ -22,7 +22,7 @@ const MAX_ANSWER_BYTES: u64 = 1 << 16;
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
 /// A video file, and the properties of its first video stream.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct VideoFile {
     /// The file.
     pub path: PathBuf,
@@ -330,25 +330,7 @@ mod tests {
 
     #[test]
     fn a_part_has_at_most_its_share_of_the_frames() {
-        let file = VideoFile {
-            path: PathBuf::new(),
-            size_px: (4, 4),
-            period_ns: 40_000_000,
-            frames: Some(50),
-            length_s: None,
-            track: 0,
-            first_s: 0.0,
-            offset_s: 0.0,
-            is_transport_stream: false,
-            assumed_matrix: None,
-            has_alpha: false,
-            is_16bit_grey: false,
-            alpha_decoder: None,
-            has_sound: false,
-            has_subtitles: false,
-            has_tags: false,
-            remarks: Vec::new(),
-        };
+        let file = VideoFile { period_ns: 40_000_000, frames: Some(50), ..VideoFile::default() };
         let parts = [(0.0, None), (0.0, Some(9.0)), (0.0, Some(1.0)), (1.5, None), (1.5, Some(1.7)), (9.0, None)];
         assert_eq!(parts.map(|(start, end)| file.count_frames(start, end)), [50, 50, 25, 13, 5, 0].map(Some));
         let unstated = VideoFile { frames: None, length_s: Some(1.99), ..file.clone() };
